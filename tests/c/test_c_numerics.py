@@ -105,8 +105,8 @@ def staircase_rows(p: int, q: int, n: int) -> tuple[Array, Array]:
     discrete = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0).discretise(TS)
     x_pb, _ = discrete.forced_response(discrete.rest(), staircase.commanded())
     e_pb = staircase.measured(0) - x_pb
-    rows = range(200, 200 + n)  # the lags before them are there
-    return np.array([oracle.features(x_pb, e_pb, k, p, q) for k in rows]), e_pb[rows]
+    rows, positions, residuals = range(200, 200 + n), x_pb.tolist(), e_pb.tolist()  # the lags before them are there
+    return np.array([oracle.features(positions, residuals, k, p, q) for k in rows]), e_pb[rows]
 
 
 @pytest.mark.slow

@@ -66,21 +66,6 @@ def test_scores_are_those_of_the_predictions() -> None:
     assert result.summary()["reduction_percent"] == pytest.approx(expected)
 
 
-def test_predictions_are_the_predictor_s_own_and_hold_the_last_residual_measured() -> None:
-    x_d, x = log()
-    result = backtest(predictor(), x_d, x)
-    replayed, residual = predictor(), 0.0
-    for i in range(0, 1010, 20):
-        window = slice(i, min(i + 20, 1010))
-        prediction = replayed.predict(x_d[window])
-        np.testing.assert_array_equal(result.x_pb[window], prediction.x_pb)
-        np.testing.assert_array_equal(result.x_h[window], prediction.x_h)
-        hold = np.where(prediction.active, prediction.x_pb + residual, prediction.x_pb)
-        np.testing.assert_allclose(result.x_hold[window], hold, rtol=1e-15)
-        replayed.update(x[window])
-        residual = float(x[window][-1] - prediction.x_pb[-1])
-
-
 @pytest.mark.parametrize("delay", [0, 3, 25])
 def test_hold_is_the_last_sample_measured_whatever_is_believed(delay: int) -> None:
     """On an axis in motion at the start, which stands, changes its level, and is missing for a while."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from averaged_cases import FRICTION, PERIOD, TS, averaged, averaged_model, cycles, friction, physics, run
+from averaged_cases import FRICTION, PERIOD, averaged, averaged_model, cycles, friction, physics, run
 from predictor_cases import MODEL
 
 from hybridsep.base.errors import ParameterError
@@ -244,9 +244,3 @@ def test_a_rest_trains_nothing_of_a_motion() -> None:
 def test_an_operator_is_refused() -> None:
     with pytest.raises(ParameterError, match="needs the paper's model, averaging = false"):
         averaged().operator()
-
-
-def test_features_are_those_of_the_model_with_averaging() -> None:
-    predictor = averaged(p=7, q=2)
-    assert predictor.regression.n_features == len(predictor.weights) == 2 + 2 + 22 + 7
-    assert predictor.T_s == TS

@@ -1,4 +1,4 @@
-"""A late measurement: windows that begin where it ends, in predictor, backtest and compensator."""
+"""A late measurement: windows that begin where it ends, in predictor and backtest."""
 
 from dataclasses import replace
 from typing import Any
@@ -6,19 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 from averaged_cases import averaged_model, cycles, physics
-from compensator_cases import DRIVE_LIMITS, TS, beyond
 from predictor_cases import MODEL
 
-from hybridsep.base.errors import ParameterError
-from hybridsep.base.settings import CompensatorSettings, PredictorSettings
+from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.compensate.compensator import SepCompensator
-from hybridsep.cosim.loop import cosimulate
-from hybridsep.cosim.run import Run
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.machines.machine import load_machine
-from hybridsep.plants.plant import Encoder
-from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
 
 NP, DELAY, N = 40, 6, 400
@@ -96,36 +88,3 @@ def test_a_delay_of_chunks_is_that_of_the_whole() -> None:
     parts = [backtest(predictor, x_d[i : i + 200], x_meas[i : i + 200]) for i in (0, 200)]
     np.testing.assert_array_equal(np.concatenate([part.x_pb for part in parts])[:200], whole.x_pb[:200])
     np.testing.assert_array_equal(parts[1].x_h[DELAY:], whole.x_h[200 + DELAY :])
-
-
-def test_the_papers_compensator_refuses_a_delay() -> None:
-    with pytest.raises(
-        ParameterError, match="measurement_delay of a compensator must be 0 with averaging = false, got 6"
-    ):
-        SepCompensator(new(DELAY, averaging=False))
-
-
-def compensated(delay: int, compensate: str = "hybrid", n_runs: int = 2) -> list[Run]:
-    """Return a cold and a warm run, or the cold one, behind a compensator that knows by how much its sensor is late."""
-    machine = load_machine("als25010_x")
-    settings = CompensatorSettings(preview=200, spacing=2, limits=DRIVE_LIMITS, compensate=compensate)
-    assert machine.plant is not None
-    sep = machine.new_compensator(settings, predictor=PredictorSettings(Np=50, p=20, measurement_delay=delay))
-    runs = []
-    for seed in range(n_runs):
-        runs.append(cosimulate(sep, machine.new_plant(), moves(), encoder=Encoder(machine.plant.noise_std, seed)))
-        sep.restart(0.0)
-    return runs
-
-
-def moves() -> Array:
-    """Return three moves of 7 mm, there and back, (1000,), m."""
-    return rest_to_rest([0.0, 0.007, 0.0, 0.007], PAPER_LIMITS, TS, start_times=[0.05, 0.35, 0.65], duration=1.0)
-
-
-@pytest.mark.slow
-def test_a_late_measurement_costs_a_compensator_little_once_it_is_known() -> None:
-    physics, sound, known = compensated(0, "physics", 1)[0], compensated(0), compensated(DELAY)
-    assert known[0].tracking_rms < 0.8 * physics.tracking_rms
-    assert known[1].tracking_rms < 1.2 * sound[1].tracking_rms < 0.3 * physics.tracking_rms
-    assert all(beyond(run.x_dm, DRIVE_LIMITS) <= 1.0 + 1e-6 for run in known)

@@ -1,20 +1,17 @@
-"""The recursive regression against the ridge problem solved directly, also in extended precision."""
+"""The recursive regression against the ridge problem solved directly, also in extended precision.
 
-from typing import Any
+Penalties of each weight, leverage and discounting against the stacked problem.
+"""
 
 import numpy as np
 import oracle
 import pytest
-import staircase_data as staircase
 from hypothesis import given
 from hypothesis import strategies as st
 from properties import examples
 
 from hybridsep.base.errors import ParameterError
-from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.model.physics import ModalModel
-from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.regression import RidgeRegression
 
 
@@ -23,10 +20,6 @@ def problem(m: int, n: int, seed: int = 0) -> tuple[Array, Array]:
     rng = np.random.default_rng(seed)
     rows = rng.normal(size=(m, n))
     return rows, rows @ rng.normal(size=n) + 0.1 * rng.normal(size=m)
-
-
-def relative_error(w: Array, exact: Any) -> float:
-    return float(np.linalg.norm((w - exact).astype(float)) / np.linalg.norm(exact.astype(float)))
 
 
 @examples(80)
@@ -52,17 +45,6 @@ def test_batches_of_any_size_give_the_direct_solution(n: int, batches: list[int]
     assert regression.residual_sum == pytest.approx(minimum, rel=1e-9, abs=1e-12)
 
 
-def test_the_factor_is_triangular_and_squares_to_the_normal_equations() -> None:
-    rows, target = problem(25, 4)
-    regression = RidgeRegression.init(4, 0.5)
-    regression = regression.update(rows, target)
-    factor = regression.factor
-    np.testing.assert_array_equal(factor, np.triu(factor))
-    stacked = np.column_stack((rows, target))
-    expected = stacked.T @ stacked + 0.5 * np.diag([1.0, 1, 1, 1, 0])
-    np.testing.assert_allclose(factor.T @ factor, expected, rtol=1e-12, atol=1e-12)
-
-
 def test_nothing_learned_means_zero() -> None:
     regression = RidgeRegression.init(3, 1e-3)
     np.testing.assert_array_equal(regression.weights, 0.0)
@@ -85,20 +67,109 @@ def test_weights_cannot_be_written() -> None:
         regression = regression.update(*problem(5, 3))
 
 
-@pytest.mark.slow
-def test_weights_after_the_staircase_against_extended_precision() -> None:
-    p, q, n, lam = 50, 3, 6000, 1e-12
-    x_d, x = staircase.commanded()[:n], staircase.measured(0)[:n]
-    predictor = HybridPredictor(
-        ModalModel.spring_mass_damper(staircase.M, staircase.C, staircase.K),
-        PredictorSettings(averaging=False, p=p, q=q, lam=lam),
+LAM = 1e-40  # λ of a factor whose penalties come with each solution
+
+
+def rows_of(kind: str, k: int, n: int, rng: np.random.Generator) -> Array:
+    """Return k rows of n features: independent ones, or lags of a smooth position, which are nearly collinear."""
+    if kind == "independent":
+        return np.asarray(rng.normal(size=(k, n)))
+    t = np.arange(k + n)
+    smooth = np.sin(0.03 * t + rng.uniform(0, 6)) + 0.2 * np.sin(0.011 * t)
+    return np.lib.stride_tricks.sliding_window_view(smooth, n)[:k] + 1e-9 * rng.normal(size=(k, n))
+
+
+def exact(rows: Array, target: Array, penalties: Array) -> Array:
+    """Return the weights in extended precision: in units of the priors the penalties are all 1."""
+    priors = 1.0 / np.sqrt(penalties)
+    return np.asarray(priors * oracle.ridge_extended(rows * priors, target, 1.0), dtype=np.float64)
+
+
+def stacked_cost(w: Array, rows: Array, target: Array, penalties: Array) -> float:
+    return float(np.sum((target - rows @ w) ** 2) + np.sum(penalties * w**2))
+
+
+@examples(60)
+@given(
+    kind=st.sampled_from(["independent", "lags"]),
+    n=st.integers(1, 14),
+    share=st.floats(0.0, 1.0),
+    batches=st.lists(st.integers(1, 30), min_size=1, max_size=4),
+    exponent=st.floats(-6.0, 2.0),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_penalised_solves_the_stacked_system(
+    kind: str, n: int, share: float, batches: list[int], exponent: float, seed: int
+) -> None:
+    """With all features and with the first ones alone; with fewer rows than features, too."""
+    rng = np.random.default_rng(seed)
+    m, k = 1 + round(share * (n - 1)), sum(batches)
+    rows = rows_of(kind, k, n, rng)
+    target = rows @ rng.normal(size=n) + 0.1 * rng.normal(size=k)
+    penalties = 10.0**exponent * rng.uniform(0.1, 10.0, m)
+    regression = RidgeRegression.init(n, LAM)
+    first = 0
+    for batch in batches:
+        regression = regression.update(rows[first : first + batch], target[first : first + batch])
+        first += batch
+    before = regression.factor
+    solution = regression.penalised(penalties)
+    stacked = np.vstack((rows[:, :m], np.diag(np.sqrt(penalties))))
+    direct = np.linalg.lstsq(stacked, np.concatenate((target, np.zeros(m))), rcond=None)[0]
+    truth = exact(rows[:, :m], target, penalties)
+    size = np.linalg.norm(truth)
+    # The error of the direct solution follows from the problem's condition: ours may be ten times as large.
+    error, unavoidable = np.linalg.norm(solution.weights - truth), np.linalg.norm(direct - truth)
+    assert error <= 10.0 * unavoidable + 1e-10 * size
+    least = stacked_cost(truth, rows[:, :m], target, penalties)
+    assert stacked_cost(solution.weights, rows[:, :m], target, penalties) == pytest.approx(least, rel=1e-9, abs=1e-20)
+    direct_sum = float(np.sum((target - rows[:, :m] @ solution.weights) ** 2))
+    assert solution.residual_sum == pytest.approx(direct_sum, rel=1e-8, abs=1e-13 * float(np.sum(target**2)))
+    np.testing.assert_array_equal(regression.factor, before)  # it is only read
+    np.testing.assert_allclose(
+        np.triu(solution.triangle).T @ np.triu(solution.triangle),
+        stacked.T @ stacked,
+        rtol=1e-11,
+        atol=1e-13 * float(np.abs(stacked.T @ stacked).max()),
     )
-    x_pb: list[float] = []
-    for first in range(0, n, predictor.Np):
-        x_pb += predictor.predict(x_d[first : first + predictor.Np]).x_pb.tolist()
-        predictor.update(x[first : first + predictor.Np])
-    e_pb = x - np.array(x_pb)
-    rows = np.array([oracle.features(x_pb, e_pb.tolist(), k, p, q) for k in range(n)])
-    exact = oracle.ridge_extended(rows, e_pb, lam)
-    assert predictor.regression.n_features == rows.shape[1] == 2 + q + p
-    assert relative_error(predictor.weights, exact) < 1e-9
+
+
+@examples(40)
+@given(n=st.integers(1, 10), k=st.integers(1, 60), seed=st.integers(0, 2**32 - 1))
+def test_leverage_is_the_variance_of_a_prediction(n: int, k: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rows, penalties = rng.normal(size=(k, n)), rng.uniform(0.5, 2.0, n)
+    regression = RidgeRegression.init(n, LAM)
+    regression = regression.update(rows, rng.normal(size=k))
+    phi = rng.normal(size=(7, n))
+    covariance = np.linalg.inv(rows.T @ rows + np.diag(penalties))
+    expected = [float(one @ covariance @ one) for one in phi]
+    np.testing.assert_allclose(regression.penalised(penalties).leverage(phi), expected, rtol=1e-9)
+
+
+@examples(40)
+@given(
+    weights=st.lists(st.floats(0.01, 1.0), min_size=1, max_size=5), lam=st.sampled_from([1e-6, 1e-2, 1.0]), n=st.just(5)
+)
+def test_discounted_rows_are_weighted_least_squares(weights: list[float], lam: float, n: int) -> None:
+    rng = np.random.default_rng(len(weights))
+    regression = RidgeRegression.init(n, lam)
+    rows, target, kept = np.zeros((0, n)), np.zeros(0), 1.0
+    for weight in weights:
+        more, goal = rng.normal(size=(9, n)), rng.normal(size=9)
+        regression = regression.discount(weight).update(more, goal)
+        rows, target = np.sqrt(weight) * rows, np.sqrt(weight) * target
+        rows, target, kept = np.vstack((rows, more)), np.concatenate((target, goal)), kept * weight
+    direct = oracle.ridge(rows, target, lam * kept)
+    np.testing.assert_allclose(regression.weights, direct, rtol=1e-9, atol=1e-12)
+
+
+def test_what_is_never_excited_stays_regular_however_long_it_is_discounted() -> None:
+    regression = RidgeRegression.init(3, LAM)
+    for _ in range(400):
+        regression = regression.discount(0.01).update(np.array([[1.0, 0.0, 0.0]]), np.array([2.0]))
+    assert np.abs(np.diag(regression.factor)[:3]).min() == 1e-150
+    np.testing.assert_allclose(regression.penalised(np.full(3, 1e-9)).weights, [2.0, 0.0, 0.0], atol=1e-8)
+    assert np.isfinite(regression.factor).all()
+    regression = regression.discount(0.0)
+    np.testing.assert_array_equal(regression.weights, 0.0)
