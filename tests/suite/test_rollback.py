@@ -80,24 +80,20 @@ def test_rollback_is_exact(new_stream: StreamMaker) -> None:
 
 
 @on_adapters(LOOK_AHEADS)
-def test_rollback_is_exact_with_short_windows(new_stream: StreamMaker) -> None:
-    assert_exact(new_stream, SHORT[new_stream.model] | {"measurement_delay": -1})
-
-
-@on_adapters(LOOK_AHEADS)
-def test_rollback_is_exact_with_averaging_and_missing_measurements(new_stream: StreamMaker) -> None:
-    assert_exact(new_stream, SHORT[new_stream.model] | {"averaging": True, "forgetting": 0.3}, missing=True)
+@pytest.mark.parametrize(
+    ("values", "missing"),
+    [({"measurement_delay": -1}, False), ({"averaging": True, "forgetting": 0.3}, True)],
+    ids=["short windows", "averaging and missing measurements"],
+)
+def test_a_look_aheads_rollback_is_exact(new_stream: StreamMaker, values: dict[str, Value], missing: bool) -> None:
+    assert_exact(new_stream, SHORT[new_stream.model] | values, missing=missing)
 
 
 @on_adapters((COMPENSATOR,))
-def test_rollback_is_exact_while_a_bounded_plan_is_solved(new_stream: StreamMaker) -> None:
+@pytest.mark.parametrize("values", [{}, {"averaging": True, "measurement_delay": 35}], ids=["bounded", "late"])
+def test_rollback_is_exact_while_a_plan_is_solved(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     # It is there 8 samples after its window has begun.
-    assert_exact(new_stream, SHORT[COMPENSATOR] | TIGHT)
-
-
-@on_adapters((COMPENSATOR,))
-def test_rollback_is_exact_while_a_late_measurement_is_planned_from(new_stream: StreamMaker) -> None:
-    assert_exact(new_stream, SHORT[COMPENSATOR] | {"averaging": True, "measurement_delay": 35} | TIGHT)
+    assert_exact(new_stream, SHORT[COMPENSATOR] | TIGHT | values)
 
 
 @pytest.mark.slow

@@ -2,8 +2,6 @@
 
 import ctypes
 import math
-import struct
-import zlib
 from collections.abc import Callable
 from ctypes import byref, c_bool, c_double, c_size_t, c_uint, c_void_p, create_string_buffer
 from pathlib import Path
@@ -292,15 +290,3 @@ def steps(fmu: Library, instance: int | None, first: int, last: int) -> None:
         assert fmu.set(instance, "x_d_ahead", 1e-3 * math.sin(0.02 * k)) == OK
         assert fmu.set(instance, "x_meas", 1e-3 * math.sin(0.02 * k - 2.1) + 1e-5 * math.cos(0.3 * k)) == OK
         assert fmu.do_step(instance, k * 1e-3, 1e-3) == OK
-
-
-HEADER_SIZE, CHECKSUM_PLACE = 120, 72  # bytes of a serialised state before its values, and where its checksum stands
-
-
-def repair_checksum(block: bytearray) -> None:
-    """Give a changed state the checksum that fits, so that what lies behind it is tested too."""
-    if len(block) < HEADER_SIZE:
-        return
-    place = slice(CHECKSUM_PLACE, CHECKSUM_PLACE + 8)
-    block[place] = bytes(8)
-    block[place] = struct.pack("<2I", zlib.crc32(block[HEADER_SIZE:]), zlib.crc32(block[:HEADER_SIZE]))
