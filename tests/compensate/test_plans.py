@@ -1,18 +1,23 @@
-"""Plans against independent oracles; limits, continuity and fall-back."""
+"""Plans against independent oracles; limits, continuity and fall-back; when the paper's model plans."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from compensator_cases import MODEL, TS, compensator, move, plant
+from hypothesis import given
+from hypothesis import strategies as st
 from oracle import clarabel_minimum
+from properties import examples
 from scipy.linalg import toeplitz
 from staircase_data import commanded
 
 from hybridsep.base.settings import Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate.newton import TOLERANCE
+from hybridsep.compensate.planning import has_stable_poles
 from hybridsep.compensate.qp import EXACT, Bounds, DriveBounds, Minimum, Tolerance, solve
 from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
 from hybridsep.cosim.loop import cosimulate
@@ -167,3 +172,32 @@ def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pyt
     assert sep.plan(ahead[:200]).state is SepState.PHYSICS
     monkeypatch.setattr("hybridsep.compensate.planning.solve", lambda *_, **__: None)
     assert sep.plan(ahead[:200]).state is SepState.OFF
+
+
+# When the paper's model plans ----------------------------------------------------------------------------------------
+
+
+@examples(200)
+@given(st.lists(st.floats(-1.5, 1.5), min_size=1, max_size=6), st.floats(-3, 3), st.floats(-3, 3))
+def test_step_down_recursion_agrees_with_the_roots(real: list[float], a: float, b: float) -> None:
+    polynomial = np.convolve(np.poly(real), np.array([1.0, a, b]))
+    radius = float(np.max(np.abs(np.roots(polynomial))))
+    if abs(radius - 1.0) > 1e-2:  # multiple roots are known to a part of their digits only
+        assert has_stable_poles(-polynomial[1:]) == (radius < 1.0)
+
+
+def test_not_a_number_is_not_stable() -> None:
+    assert not has_stable_poles(np.array([math.nan, 0.1]))
+    assert not has_stable_poles(np.array([0.1, math.inf]))
+
+
+def test_it_plans_once_the_warm_up_is_over_and_rows_were_learned() -> None:
+    rng, states = np.random.default_rng(0), []
+    sep = compensator(Np=50, p=10, t_init=0.1)
+    for _ in range(4):
+        plan = sep.plan(np.zeros(200))
+        states.append(plan.state)
+        sep.update(plan.x_pb + 1e-6 * rng.normal(size=50))
+    assert states == [SepState.PHYSICS, SepState.PHYSICS, SepState.HYBRID, SepState.HYBRID]
+    unlearned = compensator(Np=50, p=10, t_init=0.0)
+    assert unlearned.plan(np.zeros(200)).state is SepState.PHYSICS

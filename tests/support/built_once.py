@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from c_compiler import build_folder
 
 from hybridsep import build_fmu, fmu_names, load_machine, machine_names
 from hybridsep.fmi.flavours import FLAVOURS
@@ -46,6 +47,11 @@ def _only_numbers(value: str | tuple[str, ...]) -> bool:
 
 SHARED_BUILDS = "HYBRIDSEP_TESTS_BUILDS"
 """Environment variable: folder of what the processes of a test session build once for all of them."""
+
+
+def shared_builds() -> Path:
+    """Return that folder, of this process alone where there is no session."""
+    return Path(os.environ.get(SHARED_BUILDS) or build_folder())
 
 
 def built_once(path: Path, build: Callable[[Path], object]) -> Path:

@@ -2,7 +2,6 @@
 
 import ctypes
 import hashlib
-import os
 import struct
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from built_once import SHARED_BUILDS, built_once
+from built_once import built_once, shared_builds
 from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
 from places import ROOT
 
@@ -82,11 +81,6 @@ def model_sources() -> list[str]:
     return [source for source in sources() if Path(source).name.startswith("model_")]
 
 
-def _shared() -> Path:
-    """Return the folder of what the processes of a test session build once for all of them."""
-    return Path(os.environ.get(SHARED_BUILDS) or build_folder())
-
-
 @cache
 def object_files(flags: tuple[str, ...] = ("-O1", "-fPIC"), command: tuple[str, ...] = ()) -> list[str]:
     """Compile all other C files, once for each set of options, with the host's compiler if no other is asked for.
@@ -108,7 +102,7 @@ def object_files(flags: tuple[str, ...] = ("-O1", "-fPIC"), command: tuple[str, 
         with ThreadPoolExecutor() as pool:  # other processes may wait for them
             list(pool.map(compile_one, compiled))
 
-    folder = built_once(_shared() / f"objects_{key}", build)
+    folder = built_once(shared_builds() / f"objects_{key}", build)
     return [str(folder / f"{Path(source).stem}.o") for source in compiled]
 
 
@@ -144,7 +138,7 @@ def library(name: str) -> ctypes.CDLL:
     def build(built: Path) -> None:
         run_compiler([*flags, *model_sources(), EXPOSE, *object_files(), "-lm", "-o", built])
 
-    loaded = ctypes.CDLL(str(built_once(_shared() / f"{name}_{key}.so", build)))
+    loaded = ctypes.CDLL(str(built_once(shared_builds() / f"{name}_{key}.so", build)))
     loaded.test_table.restype = ctypes.POINTER(Context)
     loaded.hsep_regression_size.restype = ctypes.c_double
     loaded.hsep_encoder_measure.restype = ctypes.c_double

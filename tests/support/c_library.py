@@ -9,8 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from built_once import SHARED_BUILDS, built_once
-from c_compiler import C_SOURCES, build_folder
+from built_once import built_once, shared_builds
+from c_compiler import C_SOURCES
 from c_core import library as core_library
 
 from hybridsep.base.parameters import Parameter
@@ -50,7 +50,7 @@ def installed() -> Path:
         )
         cmake("--install", prefix / "build", "--prefix", prefix)
 
-    return built_once(Path(os.environ.get(SHARED_BUILDS) or build_folder()) / "hsep_package", build)
+    return built_once(shared_builds() / "hsep_package", build)
 
 
 def _fields(settings: dict[str, Parameter]) -> tuple[tuple[str, Any], ...]:

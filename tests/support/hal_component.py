@@ -1,14 +1,13 @@
 """The HAL component for LinuxCNC over a stub of HAL (tests/integrations/hal_stub.c), stepped period by period."""
 
 import ctypes
-import os
 import subprocess
 from functools import cache
 from pathlib import Path
 
 import numpy as np
-from built_once import SHARED_BUILDS, built_once
-from c_compiler import build_folder, compiler
+from built_once import built_once, shared_builds
+from c_compiler import compiler
 from places import ROOT
 
 from hybridsep.base.signals import Array
@@ -39,7 +38,7 @@ def _library(model: str) -> ctypes.CDLL:
         )
         assert done.returncode == 0, done.stderr
 
-    folder = built_once(Path(os.environ.get(SHARED_BUILDS) or build_folder()) / f"hal_{model}", build)
+    folder = built_once(shared_builds() / f"hal_{model}", build)
     loaded = ctypes.CDLL(str(folder / "component.so"))
     loaded.stub_scale.restype = ctypes.c_double
     loaded.stub_message.restype = ctypes.c_char_p

@@ -1,14 +1,12 @@
 """The library's models from the values of an FMU's parameters: how every test that needs both puts them together."""
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from built_once import SHARED_BUILDS, built_once
-from c_compiler import build_folder
+from built_once import built_once, shared_builds
 
 from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import SepCompensator
@@ -93,8 +91,7 @@ def trained_predictor(kind: str) -> HybridPredictor:
 
 def trained_state(kind: str) -> Path:
     """Return a file with that predictor, saved once for all processes of a test session."""
-    folder = Path(os.environ.get(SHARED_BUILDS) or build_folder())
-    return built_once(folder / f"{kind}.state", lambda path: trained_predictor(kind).save(path))
+    return built_once(shared_builds() / f"{kind}.state", lambda path: trained_predictor(kind).save(path))
 
 
 def runaway_predictor() -> HybridPredictor:
