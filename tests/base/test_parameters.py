@@ -82,20 +82,6 @@ def test_what_a_parameter_cannot_be(name: str, value: object, message: str) -> N
             check(name, value, label=label or name)
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("lambda", "ridge penalty on the weights of the residual model [m2], 1e-40 … 1e+12"),
-        ("alpha", "numerator of the mode's transfer function, constant term [1/s2], -1e+15 … 1e+15"),
-        ("jerk_weight", "weight of the jerk of the command's change against the tracking error, 0 … 1e+12"),
-        ("no_reversal", "whether the modified command never turns while the commanded position moves"),
-        ("input_hold", "how the command x_d runs between samples, zero-order or first-order hold, zoh or foh"),
-    ],
-)
-def test_help(name: str, text: str) -> None:
-    assert PARAMETERS[name].help == text
-
-
 def test_all_problems_at_once() -> None:
     with pytest.raises(ParameterError) as caught:
         PredictorSettings(averaging=False, Np=0, p=0, q=-1, lam=0.0, T_s=-1.0, t_init=-0.5)

@@ -4,7 +4,6 @@ import ast
 import json
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -32,15 +31,6 @@ def test_three_lists_of_names_agree() -> None:
     assert vars(hybridsep)["_MODULES"] == modules
     assert set(hybridsep.__all__) == {*modules, "__version__"}
     assert len(modules) <= 32
-
-
-@pytest.mark.parametrize("name", hybridsep.__all__)
-def test_every_name_is_there(name: str) -> None:
-    assert name in dir(hybridsep)
-    value = getattr(hybridsep, name)
-    if name != "__version__":
-        home = import_module(f"hybridsep.{names_for_type_checkers()[name]}")
-        assert value is getattr(home, name)
 
 
 def test_another_name_is_an_attribute_error() -> None:

@@ -1,8 +1,10 @@
 """Columns of a log: which are read, in which units, and what is said where that cannot be known."""
 
 import json
+import re
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -83,10 +85,12 @@ def test_a_german_log(tmp_path: Path) -> None:
     np.testing.assert_allclose((*log.t, *log.x_d, *log.x_meas), (0, 2e-3, 1.5e-3, 2e-3, 1e-3, 1.5e-3))
 
 
-@pytest.mark.parametrize("unit", ["cm", "0um"])
-def test_units_that_are_none(tmp_path: Path, unit: str) -> None:
+@pytest.mark.parametrize("unit", ["cm", "0um", "furlong", 1e-3, b"mm", ["mm"]])
+def test_units_that_are_none(tmp_path: Path, unit: Any) -> None:
     path = write(tmp_path / "log.npz", columns())
-    with pytest.raises(LogError, match=rf"unit must be one of m, mm, .*, got '{unit}'; a multiple of one is said as"):
+    with pytest.raises(
+        LogError, match=f"unit must be one of m, mm, .*, got {re.escape(repr(unit))}; a multiple of one is said as"
+    ):
         read_log(path, unit=unit)
     np.testing.assert_allclose(read_log(path, unit="0.1um").x_d, 1e-7 * columns()["x_d"])
     assert read_log(path, unit="1e-4 deg").unit == "rad"

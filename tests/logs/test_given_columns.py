@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pytest
-from log_files import columns
 
 import hybridsep
 from hybridsep.base.errors import HybridSepError, LogError, SignalError
@@ -236,12 +235,6 @@ def test_units_after_a_comma() -> None:
     assert stated_unit("Position, mm") == ("Position", "mm")
     assert stated_unit("t_milliseconds") == ("t", "milliseconds")
     assert stated_unit("t [milliseconds]") == ("t", "milliseconds")
-
-
-@pytest.mark.parametrize("unit", [1e-3, "furlong", b"mm", ["mm"]])
-def test_units_that_are_none(unit: Any) -> None:
-    with pytest.raises(LogError, match="unit must be one of m, mm"):
-        read_log(columns(), unit=unit)
 
 
 @pytest.mark.parametrize(

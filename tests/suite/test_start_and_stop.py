@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from driving import T_S, closed_loop, initialise, replay, steps
+from driving import T_S, initialise, steps
 from stream import (
     COMPENSATOR,
     DRIVE,
@@ -35,17 +35,6 @@ def test_the_stop_time_is_reached_in_rounded_sums(new_stream: StreamMaker) -> No
     assert t != 0.1
     with pytest.raises(RefusedStreamError, match=r"a step must begin before the stop time 0.1 s, got one from 0.1"):
         stream.step(t, T_S)
-
-
-@pytest.mark.slow
-@on_adapters(LOOK_AHEADS)
-def test_any_start_time_gives_the_same(new_stream: StreamMaker) -> None:
-    loop, stream = closed_loop(new_stream.model, 400), new_stream()
-    stream.initialise(loop.values, start=1234.5)
-    shown = replay(stream, loop, start_time=1234.5)
-    other = new_stream()
-    other.initialise(loop.values)
-    np.testing.assert_array_equal(replay(other, loop), shown)
 
 
 @on_adapters((*LOOK_AHEADS, TRAJECTORY))
