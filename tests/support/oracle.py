@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import clarabel
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 from scipy.signal import cont2discrete, tf2ss
 from scipy.sparse import csc_matrix
 
@@ -70,27 +71,23 @@ def ridge(rows: Array, target: Array, lam: float) -> Array:
 
 
 def ridge_extended(rows: Array, target: Array, lam: float) -> LongArray:
-    """Eq. (6), solved from all rows by Householder QR in long double; ``(m, n), (m,) → (n,)``."""
-    m, n = rows.shape
-    work = np.zeros((n + m, n + 1), dtype=np.longdouble)
-    work[range(n), range(n)] = np.sqrt(np.longdouble(lam))
-    work[n:, :n], work[n:, n] = rows, target
-    for j in range(n):
-        # In column j only row j and the data's rows are not yet zero below the diagonal, and rows j+1 … n−1 of the
-        # penalty are zero in it: the reflection touches row j and the data's rows alone.
-        v = np.concatenate((work[j : j + 1, j], work[n:, j]))
-        norm = np.sqrt(np.sum(v * v))
-        if norm == 0:
-            continue
-        v[0] += norm if v[0] >= 0 else -norm
-        scale = 2 / np.sum(v * v)
-        projected = scale * (v[0] * work[j, j:] + v[1:] @ work[n:, j:])
-        work[j, j:] -= v[0] * projected
-        work[n:, j:] -= np.outer(v[1:], projected)
-    w = np.zeros(n, dtype=np.longdouble)
-    for j in range(n - 1, -1, -1):
-        w[j] = (work[j, n] - np.sum(work[j, j + 1 : n] * w[j + 1 :])) / work[j, j]
-    return w
+    """Eq. (6), solved from all rows to the digits of long double; ``(m, n), (m,) → (n,)``.
+
+    A double solution is refined, its residuals in long double: Björck, BIT 7 (1967), 257.
+    """
+    n, long = rows.shape[1], np.longdouble
+    A, b = np.vstack((np.sqrt(long(lam)) * np.eye(n), rows)), np.concatenate((np.zeros(n), target)).astype(long)
+    scale = np.sqrt(np.sum(A * A, axis=0))
+    A /= scale
+    columns, R = np.linalg.qr(A.astype(np.float64))
+    w, residual = np.zeros(n, dtype=long), np.zeros(len(b), dtype=long)
+    for _ in range(8):
+        # [I A; Aᵀ 0] [residual; w] = [b; 0]
+        f, g = (b - residual - A @ w).astype(np.float64), -(A.T @ residual).astype(np.float64)
+        along = columns.T @ f - solve_triangular(R, g, trans=1)
+        w += solve_triangular(R, along)
+        residual += f - columns @ along
+    return np.asarray(w / scale)
 
 
 @dataclass
