@@ -1,6 +1,6 @@
 """Paper's model and predictor with averaging beside the physics model and the hold, cold and warm.
 
-    python -m benchmarks.averaging [--emps DATA_EMPS.mat] [--recordings FOLDER]      (two minutes)
+    python -m benchmarks.averaging [--emps DATA_EMPS.mat]      (four minutes)
 
 RMS of the prediction error against the measured position, µm, over the whole run from its first sample. A warm run goes
 on with what the cold one has learned, under other noise; over a recording it is a second pass. The stage's friction
@@ -31,6 +31,7 @@ from hybridsep.plants.trajectory import PAPER_LIMITS, along_path, rest_to_rest, 
 from hybridsep.predict.predictor import HybridPredictor
 
 SEEDS = (0, 1000)  # seeds of the encoder noise, cold and warm
+RECORDINGS = sorted((Path(__file__).parent / "recordings").glob("*.npz"))
 WINDOWS = (100, 20)  # samples in a window, ``Np``, over a recording; ``p`` is 50 where it fits
 
 
@@ -71,15 +72,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat: the recorded axis, too")
-    parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
     options = parser.parse_args(arguments)
     columns = ("physics", "hold", "paper", "warm", "averaging", "warm", "× physics", "× hold")
     print(f"{'µm; ratios: averaging, cold':40}" + "".join(f"{column:>10}" for column in columns))
-    for case in cases(options.emps, options.recordings):
+    for case in cases(options.emps, RECORDINGS):
         print(replayed(case), flush=True)
 
 
-def cases(emps: Path | None = None, recordings: Path | None = None) -> Iterator[Case]:
+def cases(emps: Path | None = None, recordings: Sequence[Path] = ()) -> Iterator[Case]:
     """Yield the simulated drives, the EMPS axis and the recordings."""
     drive, stage = paper_machine("spring_mass_damper"), [paper_machine(f"als25010_{axis}") for axis in "xy"]
     yield simulated("staircase", drive, staircase())
@@ -93,9 +93,8 @@ def cases(emps: Path | None = None, recordings: Path | None = None) -> Iterator[
         machine = paper_machine("emps")
         log = read_log(emps, columns=machine.log.columns)
         yield Case("EMPS", machine.model, machine.predictor_settings, log.x_d, (log.x_meas, log.x_meas))
-    files = [] if recordings is None else sorted(recordings.glob("*.csv"))
     for Np in WINDOWS:
-        yield from (recorded(file, Np) for file in files)
+        yield from (recorded(path, Np) for path in recordings)
 
 
 def stage_paths() -> Iterator[tuple[str, tuple[Array, Array]]]:
@@ -147,19 +146,10 @@ def random_moves(seed: int) -> Array:
 
 def recorded(path: Path, Np: int) -> Case:
     """Return the case of a recording with a model fitted to it."""
-    x_d, x, T_s = even(path)
-    settings = PredictorSettings(averaging=False, Np=Np, p=min(50, Np), T_s=T_s)
-    return Case(f"{path.stem}, Np = {Np}", fitted_model(x_d, x, T_s), settings, x_d, (x, x))
-
-
-def even(path: Path) -> tuple[Array, Array, float]:
-    """Return commanded and measured positions of a recording, m, and its T_s, s; resampled where intervals vary."""
-    t, x_d, x = np.loadtxt(path, delimiter=",", skiprows=1, usecols=(0, 1, 2), unpack=True)
-    T_s = round(float(np.median(np.diff(t))), 6)
-    if np.ptp(np.diff(t)) > 0.1 * T_s:
-        even = np.arange(t[0], t[-1], T_s)
-        x_d, x = np.interp(even, t, x_d), np.interp(even, t, x)
-    return np.ascontiguousarray(x_d), np.ascontiguousarray(x), T_s
+    log = read_log(path)
+    settings = PredictorSettings(averaging=False, Np=Np, p=min(50, Np), T_s=log.T_s)
+    model = fitted_model(log.x_d, log.x_meas, log.T_s)
+    return Case(f"{path.stem}, Np = {Np}", model, settings, log.x_d, (log.x_meas, log.x_meas))
 
 
 def fitted_model(x_d: Array, x: Array, T_s: float) -> ModalModel:

@@ -1,6 +1,6 @@
 """Predictor with averaging in conditions that differ from a run at rest at 1 kHz with a sensor that does not lag.
 
-    python -m benchmarks.conditions [--emps DATA_EMPS.mat] [--recordings FOLDER] [--n 40]      (some minutes)
+    python -m benchmarks.conditions [--emps DATA_EMPS.mat] [--n 40]      (some minutes)
 
 1. Start in motion: runs cut in mid-motion, RMS relative to the physics model's, which starts at rest, too.
 2. Delay of the measurement: RMS relative to a run without delay over the same samples, predicted at the same
@@ -22,7 +22,7 @@ import numpy as np
 from random_drives.generator import SEED, random_drives
 from random_drives.simulation import simulate as simulate_many
 
-from benchmarks.averaging import SEEDS, Case, cases, simulated
+from benchmarks.averaging import RECORDINGS, SEEDS, Case, cases, simulated
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
@@ -63,10 +63,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat: the recorded axis, too")
-    parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
     parser.add_argument("--n", type=int, default=40, help="number of random drives")
     options = parser.parse_args(arguments)
-    print_ratios("start in motion, × physics", starts_in_motion(options.emps, options.recordings, options.n))
+    print_ratios("start in motion, × physics", starts_in_motion(options.emps, options.n))
     late = f"delay of {DELAY} samples, × no delay"
     print_ratios(f"{late} at one horizon", delays(options.emps, options.n, at_one_horizon=True))
     print_ratios(f"{late}, {DELAY} samples further", delays(options.emps, options.n, at_one_horizon=False))
@@ -84,17 +83,17 @@ def print_ratios(title: str, ratios: Iterator[tuple[str, float, float]]) -> None
     print(f"{f'largest of {len(found)}':64}{max(found):9.3f}")
 
 
-def starts_in_motion(emps: Path | None, recordings: Path | None, n: int) -> Iterator[tuple[str, float, float]]:
+def starts_in_motion(emps: Path | None, n: int) -> Iterator[tuple[str, float, float]]:
     """Yield names, RMS errors with averaging and of the physics model on runs cut in mid-motion."""
-    for case, cut in motions(emps, recordings, n):
+    for case, cut in motions(emps, n):
         settings = replace(case.settings, averaging=True, t_init=-1.0)
         found = backtest(HybridPredictor(case.model, settings), case.x_d[cut:], case.x_meas[0][cut:]).overall
         yield f"{case.name}, from sample {cut} on", found.h.rms, found.pb.rms
 
 
-def motions(emps: Path | None, recordings: Path | None, n: int) -> Iterator[tuple[Case, int]]:
+def motions(emps: Path | None, n: int) -> Iterator[tuple[Case, int]]:
     """Yield cases and the samples at which they are cut."""
-    for case in (*cases(emps, recordings), *random_cases(n)):
+    for case in (*cases(emps, RECORDINGS), *random_cases(n)):
         for part in CUTS:
             first = round(part * len(case.x_d))
             speed = np.abs(np.diff(case.x_d[first : first + len(case.x_d) // 10]))

@@ -1,18 +1,18 @@
 """``hybridsep fit`` over logs of several machines, judged on their second halves beside what needs no hybrid.
 
-    python -m benchmarks.fit [--emps DATA_EMPS.mat] [--recordings FOLDER] [--windows 100 20]      (ten minutes)
-    python -m benchmarks.fit --recordings FOLDER --method my_module:MyMethod
+    python -m benchmarks.fit [--emps DATA_EMPS.mat] [--windows 100 20] [LOG ...]      (ten minutes)
+    python -m benchmarks.fit --method my_module:MyMethod
 
 RMS of the second half, which is held out, in 1e-6 of the log's unit. A first-order lag with dead time, fitted to
 the first half by least squares, and its last residual held over the window; the physics model's last residual held;
-ARX of 20 and 40 lags, frozen after the first half / refitted before each window; the identified physics model with
-its offset; the hybrid that the first half trained. The ratio is to the best of the others, and the advice is what
-``fit`` prints. Below the table stands in how many rows the hybrid is recommended, and in how many of these another is
-better by 2 %.
+ARX of 20 and 40 lags, frozen after the first half / refitted before each window; a state-space model (N4SID); the
+identified physics model with its offset; the hybrid that the first half trained. The hybrid's RMS and largest error are
+relative to the least of the eight others, their geometric means below the table; beside these stands in how many rows
+``fit`` recommends the hybrid, and in how many of these another is better by 2 %.
 
 An open benchmark: ``--method`` is one of your own, a class like :class:`Method`, whose RMS and largest error on the
 same samples are printed below each row, relative to the best of all others. It may see the first half of a log, and of
-the second each window behind its prediction; licences of recordings are beside them.
+the second each window behind its prediction. The logs are the recordings beside this file, or yours.
 """
 
 import argparse
@@ -25,6 +25,7 @@ from typing import Protocol
 
 import numpy as np
 
+from benchmarks.averaging import RECORDINGS
 from hybridsep.base.errors import HybridSepError
 from hybridsep.base.metrics import ErrorSize
 from hybridsep.base.signals import Array
@@ -35,9 +36,10 @@ from hybridsep.machines.machine import machine_name
 
 WINDOWS = (100, 20)
 
-COPIES = ("xl330_kp100_raw_jitter.csv",)  # recordings that are others again
-
-COLUMNS = ("lag + hold", "hold", "ARX20", "ARX40", "physics", "hybrid", "best of the others", "ratio", "advice")
+COLUMNS = (
+    *("lag + hold", "hold", "ARX20", "ARX40", "N4SID", "physics", "hybrid"),
+    *("best of the others", "RMS ÷ its", "largest ÷ the least"),
+)
 
 
 class Method(Protocol):
@@ -83,6 +85,11 @@ class Row:
         """RMS of the hybrid relative to the best of the others."""
         return self.rms["hybrid"] / self.rms[self.best]
 
+    @property
+    def ratio_of_largest(self) -> float:
+        """Largest error of the hybrid relative to the least of the others."""
+        return self.largest["hybrid"] / min(error for name, error in self.largest.items() if name != "hybrid")
+
     def __str__(self) -> str:
         def shown(*names: str) -> str:
             return " / ".join(
@@ -90,22 +97,22 @@ class Row:
             )
 
         ways = [shown(f"{name} (frozen)", f"{name} (refitted)") for name in ("ARX20", "ARX40")]
-        cells = [shown("lag + hold"), shown("hold"), *ways, shown("physics model"), shown("hybrid")]
-        advice = self.advice.partition(", ")[0]
-        return f"| {' | '.join([self.name, str(self.Np), *cells, self.best, f'{self.ratio:.3f}', advice])} |"
+        cells = [shown("lag + hold"), shown("hold"), *ways, shown("N4SID"), shown("physics model"), shown("hybrid")]
+        ratios = [f"{self.ratio:.3f}", f"{self.ratio_of_largest:.3f}"]
+        return f"| {' | '.join([self.name, str(self.Np), *cells, self.best, *ratios])} |"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat")
-    parser.add_argument("--recordings", type=Path, help="folder with recorded logs, CSV")
+    parser.add_argument("logs", type=Path, nargs="*", default=RECORDINGS, metavar="LOG", help="logs of yours instead")
     parser.add_argument("--windows", type=int, nargs="+", default=WINDOWS, help="samples in a window, Np")
     parser.add_argument("--method", help="a method of your own: its module, a colon, its class")
     given = parser.parse_args(arguments)
     print(f"| log | Np | {' | '.join(COLUMNS)} |\n|---|{'---|' * (len(COLUMNS) + 1)}")
     rows = []
-    for log in logs(given.emps, given.recordings):
+    for log in logs(given.emps, given.logs):
         for Np in given.windows:
             try:
                 rows.append(row(log, Np))
@@ -127,13 +134,11 @@ def own(method: str, log: Log, judged: Row) -> str:
     return f"| {name} | {judged.Np} | {ratios} |"
 
 
-def logs(emps: Path | None, recordings: Path | None) -> Iterator[Log]:
+def logs(emps: Path | None, recordings: Sequence[Path]) -> Iterator[Log]:
     """Yield the logs, as their files are."""
     if emps is not None:
         yield read_log(emps, columns={"x_d": "qg", "x": "qm"})
-    for path in sorted(recordings.glob("*.csv")) if recordings is not None else []:
-        if path.name not in COPIES:
-            yield read_log(path)
+    yield from map(read_log, recordings)
 
 
 def row(log: Log, Np: int) -> Row:
@@ -148,10 +153,16 @@ def row(log: Log, Np: int) -> Row:
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """Return how often the hybrid is recommended, and how often where another is better by 2 %."""
+    """Return the means, how often the hybrid is recommended, and how often where another is better by 2 %."""
+    means = [
+        float(np.exp(np.mean(np.log(one)))) for one in zip(*((r.ratio, r.ratio_of_largest) for r in rows), strict=True)
+    ]
     used = [one for one in rows if one.advice.startswith("Use the hybrid")]
     wrong = [one for one in used if one.ratio > 1.0 / (1.0 - ALIKE)]
-    return f"recommended in {len(used)} of {len(rows)} rows; in {len(wrong)} of these another is better by 2 %"
+    return (
+        f"means {means[0]:.3f} and {means[1]:.3f}; recommended in {len(used)} of {len(rows)} rows, in {len(wrong)} of "
+        "which another is better by 2 %"
+    )
 
 
 if __name__ == "__main__":

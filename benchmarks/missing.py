@@ -1,6 +1,6 @@
 """Predictions where measurements are missing, relative to those where none is: hybrid model and ARX models.
 
-    python -m benchmarks.missing --emps DATA_EMPS.mat --recordings FOLDER --so101 FOLDER      (five minutes)
+    python -m benchmarks.missing --emps DATA_EMPS.mat      (five minutes)
 
 Of six recordings every n-th sample is missing, or some at random. The hybrid is replayed by the C core; ARX models are
 refitted before each window. RMS of the test half against all its measurements, those that were taken away, too.
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.ablation.axes import Axis, Folders, logs_of
+from benchmarks.ablation.axes import Axis, logs_of
 from benchmarks.ablation.core import CoreVariant
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Indices
@@ -21,13 +21,13 @@ from hybridsep.evaluate.peers import REFITTED, Piece, predict_peers
 EVERY, SHARES = (30, 20, 15, 10, 7, 5, 4, 3), (0.05, 0.1, 0.2, 0.3, 0.36, 0.4)
 """Samples from one missing measurement to the next; shares of those missing at random."""
 
-RECORDINGS = (
+LOGS = (
     "DATA_EMPS, Np = 100",
     "cnc_a_axis2, Np = 20",
     "cnc_b_axis2, Np = 100",
     "xl330_kp400, Np = 20",
     "xl330_sin_sin_kp100, Np = 100",
-    "multisine_Elbow, Np = 20",
+    "so101_multisine_elbow, Np = 20",
 )
 """Recordings and windows."""
 
@@ -57,11 +57,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat")
-    parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
-    parser.add_argument("--so101", type=Path, help="folder of recordings of the arm, likewise")
-    folders = parser.parse_args(arguments)
-    axes = [make() for make in logs_of(Folders(folders.emps, folders.recordings, folders.so101))]
-    for axis in (one for one in axes if one.name in RECORDINGS):
+    axes = [make() for make in logs_of(parser.parse_args(arguments).emps)]
+    for axis in (one for one in axes if one.name in LOGS):
         print(axis.name)
         found = errors_of(axis)
         for name, errors in found.items():

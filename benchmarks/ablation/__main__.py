@@ -1,7 +1,6 @@
 """Ablation of the model with averaging: each of its rules switched off, or its constant changed, one at a time.
 
-    python -m benchmarks.ablation [--emps DATA_EMPS.mat] [--recordings FOLDER] [--so101 FOLDER] [--n 12]
-                                  [--only TEXT] [--lines] [--jobs 2]
+    python -m benchmarks.ablation [--emps DATA_EMPS.mat] [--n 12] [--only TEXT] [--lines] [--jobs 2]
 
 Axes of ``benchmarks/ablation/axes.py``, replayed by the C core with some of its lines changed. The first row has the
 errors relative to what an axis is judged by, geometric means of cold and warm runs and the worst lines; the others have
@@ -18,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.ablation.axes import Axis, Errors, Folders, errors_of, logs_of, simulations_of
+from benchmarks.ablation.axes import Axis, Errors, errors_of, logs_of, simulations_of
 from benchmarks.ablation.core import Changes, CoreVariant
 from hybridsep.base.errors import SignalError
 from hybridsep.predict.averaging.constants import CONSTANTS
@@ -139,8 +138,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--emps", type=Path, help="DATA_EMPS.mat")
-    parser.add_argument("--recordings", type=Path, help="folder of recordings, *.csv with the columns t, x_d, x")
-    parser.add_argument("--so101", type=Path, help="folder of recordings of the arm, likewise")
     parser.add_argument("--n", type=int, default=12, help="random drives of each generator")
     parser.add_argument("--only", default="", help="rows whose name has this text")
     parser.add_argument("--lines", action="store_true", help="a line for each axis, too")
@@ -148,7 +145,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     tried = {"as it is": {}, **{name: change for name, change in VARIANTS.items() if given.only in name}}
     with ProcessPoolExecutor(given.jobs) as pool:
-        logs = [pool.submit(make) for make in logs_of(Folders(given.emps, given.recordings, given.so101))]
+        logs = [pool.submit(make) for make in logs_of(given.emps)]
         axes = [*(log.result() for log in logs), *simulations_of(given.n)]
         results = pool.map(partial(all_errors, axes), [CoreVariant(change) for change in tried.values()])
     print("\n".join(tables(axes, dict(zip(tried, results, strict=True)), lines=given.lines)))

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.ablation.core import Run
-from benchmarks.averaging import Case, cases, even
+from benchmarks.averaging import RECORDINGS, Case, cases
 from benchmarks.conditions import CUTS, SETTLED, changed_plants
 from benchmarks.random_drives import GENERATORS
 from hybridsep.base.errors import IdentificationError
@@ -31,12 +31,12 @@ from hybridsep.logs.log import read_log
 from hybridsep.machines.machine import paper_machine
 from hybridsep.model.physics import ModalModel
 
-WINDOWS = {"recordings": (100, 20), "so101": (5, 20)}  # samples in a window, ``Np``, by the folder of the logs
+SO101 = "so101"  # beginning of the names of the arm's logs
+WINDOWS = {"recordings": (100, 20), SO101: (5, 20)}  # samples in a window, ``Np``, by the group of the logs
 
-CHOOSE = {"recordings": ("cnc_a", "xl330_sin_sin"), "so101": ("Rotation",)}
-"""Parts of the names of logs that constants may be chosen on, by folder; the others judge."""
+CHOOSE = ("cnc_a", "xl330_sin_sin", "rotation")
+"""Parts of the names of logs that constants may be chosen on; the others judge."""
 
-COPIES = "raw_jitter"  # part of the name of a recording that is a copy of another
 SEEDS = {"modal": 103, "two_mass": 104, "changed": 101}  # seeds of the random drives, which no constant was chosen on
 LEVELS = (0.5, 0.9, 0.95)  # probabilities of intervals whose coverage is measured
 
@@ -79,14 +79,6 @@ class Errors(NamedTuple):
     within: tuple[float, ...]
 
 
-class Folders(NamedTuple):
-    """Where the recorded axes are; None: left out."""
-
-    emps: Path | None
-    recordings: Path | None
-    so101: Path | None
-
-
 def errors_of(axis: Axis, replay: Replay) -> Errors:
     """Return the errors of a replay on an axis."""
     runs = [(axis.x_d, x) for x in axis.x]
@@ -106,24 +98,17 @@ def errors_of(axis: Axis, replay: Replay) -> Errors:
     return Errors(rms(error) / axis.best, rms(of_warm) / axis.best_warm, score, within)
 
 
-def logs_of(folders: Folders) -> Iterator[Callable[[], Axis]]:
+def logs_of(emps: Path | None) -> Iterator[Callable[[], Axis]]:
     """Yield what returns the recorded axes, each with each window: identification takes time."""
-    files = [] if folders.emps is None else [("recordings", folders.emps)]
-    for name, folder in (("recordings", folders.recordings), ("so101", folders.so101)):
-        files += [] if folder is None else [(name, path) for path in sorted(folder.glob("*.csv"))]
-    for name, path in files:
-        if COPIES not in path.stem:
-            yield from (partial(_log, name, path, Np) for Np in WINDOWS[name])
+    for path in (*([] if emps is None else [emps]), *RECORDINGS):
+        name = SO101 if path.stem.startswith(SO101) else "recordings"
+        yield from (partial(_log, name, path, Np) for Np in WINDOWS[name])
 
 
-def _log(folder: str, path: Path, Np: int) -> Axis:
+def _log(name: str, path: Path, Np: int) -> Axis:
     """Return the axis of a log, identified from its first half."""
-    if path.suffix == ".mat":
-        columns = paper_machine("emps").log.columns
-        log = read_log(path, columns=columns)
-        x_d, x, T_s = log.x_d, log.x_meas, log.T_s
-    else:
-        x_d, x, T_s = even(path)
+    log = read_log(path, columns=paper_machine("emps").log.columns if path.suffix == ".mat" else None)
+    x_d, x, T_s = log.x_d, log.x_meas, log.T_s
     n_train = round(0.5 * len(x))
     first = -(-n_train // Np) * Np
     found = _identified(x_d[:n_train].tobytes(), x[:n_train].tobytes(), T_s)
@@ -133,9 +118,9 @@ def _log(folder: str, path: Path, Np: int) -> Axis:
     errors = [rms((residual - found.offset)[first:]), rms((residual - residual[begins - 1])[first:])]
     peers = predict_peers([Piece(x_d, x, n_train, first)], Np)
     errors += [np.inf if peer.diverged else rms((x - peer.predictions[0])[first:]) for peer in peers]
-    chooses = any(part in path.stem for part in CHOOSE[folder])
+    chooses = any(part in path.stem for part in CHOOSE)
     best = float(min(errors))
-    group = f"{folder} {'to choose on' if chooses else 'that judge'}"
+    group = f"{name} {'to choose on' if chooses else 'that judge'}"
     return Axis(group, f"{path.stem}, Np = {Np}", found.model, settings, x_d, (x, x), first, True, best, best)
 
 

@@ -61,6 +61,10 @@ _EXCESS_MAX = 0.1
 whose errors are alike tell little. With a shorter dead time, or more damping, the product of fitted and held-out error
 may have it."""
 
+_GAIN_MAX = 10.0
+"""Largest static gain, and inverse of the smallest one, of a position loop: what friction holds seems to have a smaller
+one, by which plans would ask for many times the motion. Small servos under load were recorded at 0.2."""
+
 _GAINS_MAX = 20.0
 """Largest sum of the modes' gains in multiples of the static gain: above it, large modes cancel each other. In Table 1
 it is 6.6."""
@@ -255,7 +259,7 @@ def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:
     structure = fit.structure
     gains, _ = structure.gains(fit.linear)
     gain = float(gains.sum())
-    if gain <= 0:
+    if not 1.0 / _GAIN_MAX <= gain <= _GAIN_MAX:
         return f"static gain of {gain:.3g}"
     if float(np.abs(gains).sum()) > _GAINS_MAX * gain:
         return "large modes that cancel each other"

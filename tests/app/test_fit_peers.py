@@ -33,10 +33,9 @@ def arx_rms(x_d: Array, x: Array, n: int) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
 @pytest.mark.usefixtures("quick_fit")
 def test_the_hybrid_is_not_recommended_where_an_arx_is_better(hybridsep: Run, tmp_path: Path) -> None:
-    log = RECORDINGS / "cnc_a_axis2.csv"
+    log = RECORDINGS / "cnc_a_axis2.npz"
     used = read_log(log)
     status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", NP)
     assert status == 0, err

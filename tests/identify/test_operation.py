@@ -5,14 +5,14 @@ import json
 import numpy as np
 import pytest
 from identification_cases import T_S, correlated, measured, moves
-from places import EMPS, ROOT
+from places import EMPS, RECORDINGS
 from scipy import io
 
 from hybridsep import ModalModel, Mode
 from hybridsep.base.errors import IdentificationError
 from hybridsep.base.signals import Array
 from hybridsep.identify.model import IdentifiedModel
-from hybridsep.identify.operation import identify_operation, unit_gain_model
+from hybridsep.identify.operation import TOO_LITTLE, identify_operation, unit_gain_model
 from hybridsep.identify.output_error import Delay, as_segments, fit_structure, without
 from hybridsep.identify.selection import slow_parts
 from hybridsep.identify.structure import Structure, lag_mode
@@ -20,7 +20,6 @@ from hybridsep.identify.uncertainty import estimates
 
 LAG = ModalModel([lag_mode(8e-3)], dead_time=3)
 SECOND = ModalModel([Mode(20.0, 0.4, (40 * np.pi) ** 2, 0.0)])
-RECORDINGS = ROOT.parent / "shared" / "data" / "recordings"
 
 
 def value(found: IdentifiedModel, name: str) -> tuple[float, float]:
@@ -156,6 +155,16 @@ def test_two_modes_are_found_with_a_gain() -> None:
     assert sorted(value(found, f"mode[{i}].f_n")[0] for i in (1, 2)) == pytest.approx([25.0, 60.0], rel=0.01)
     assert value(found, "gain")[0] == pytest.approx(0.98, abs=1e-4)
     assert difference(found, truth, "foh", x_d) < 2e-6
+
+
+@pytest.mark.slow
+def test_an_axis_that_friction_holds_has_a_gain_of_one() -> None:
+    """Plans by a model that moves a thirtieth as far would ask for thirty times the motion."""
+    x_d = moves(2000)
+    x = x_d[0] + 0.03 * (measured(LAG, x_d) - x_d[0])
+    found = identify_operation([(x_d, x)], T_S)
+    assert found.model.dc_gain == pytest.approx(1.0)
+    assert any(TOO_LITTLE in finding for finding in found.findings)
 
 
 @pytest.mark.slow
@@ -339,8 +348,8 @@ def test_the_last_resort_follows_its_command() -> None:
 
 
 def half(name: str) -> tuple[Array, Array, float]:
-    _, x_d, x = np.loadtxt(RECORDINGS / f"{name}.csv", delimiter=",", skiprows=1).T
-    return x_d, x, 0.002 if name.startswith("cnc") else 0.0053
+    columns = np.load(RECORDINGS / f"{name}.npz")
+    return columns["x_d"], columns["x"], 0.002 if name.startswith("cnc") else 0.0053
 
 
 def physics_error(found: IdentifiedModel, x_d: Array, x: Array) -> float:
@@ -362,7 +371,6 @@ def test_the_recorded_axis_is_predicted() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
 @pytest.mark.parametrize(
     ("name", "limit"),
     [
@@ -378,7 +386,6 @@ def test_recordings_get_a_model(name: str, limit: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not RECORDINGS.is_dir(), reason=f"the recordings are not at {RECORDINGS}")
 def test_a_half_at_rest_is_refused() -> None:
     x_d, x, T_s = half("cnc_a_axis6")
     n = len(x) // 2

@@ -10,7 +10,7 @@ from generated_logs import ACCUSED_BEFORE, generated_log, log_of
 from hypothesis import example, given
 from hypothesis import strategies as st
 from log_files import write
-from places import CASES, RECORDINGS, SO101
+from places import CASES, RECORDINGS
 from properties import examples
 from scipy.signal import chirp
 
@@ -22,10 +22,7 @@ from hybridsep.logs.log import Log, read_log
 
 GOOD_CASES = CASES.parent / "good"
 
-RECORDED = [
-    *(sorted(folder.glob("*.csv"))[i] for folder in (RECORDINGS, SO101) if folder.is_dir() for i in range(10)),
-    *sorted(GOOD_CASES.glob("*.npz")),
-]
+RECORDED = [*sorted(RECORDINGS.glob("*.npz")), *sorted(GOOD_CASES.glob("*.npz"))]
 
 
 def names(log: Log) -> list[str]:
@@ -43,7 +40,7 @@ def test_a_recorded_log_is_taken_as_it_is(path: Path) -> None:
     if "hej90" in path.stem:  # whose sensor is renewed every 15 ms
         assert (len(log.t), log.T_s) == (745, 0.015)
         return
-    columns = np.load(path) if path.suffix == ".npz" else np.genfromtxt(path, delimiter=",", names=True)
+    columns = np.load(path)
     np.testing.assert_array_equal([log.x_d, log.x_meas], [columns["x_d"], columns["x"]])
     assert (log.starts, log.remarks) == ((0,), ())
 

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from log_files import capture, columns
-from places import RECORDINGS
+from places import CAPTURE, RECORDINGS
 from recorders import halscope_csv, trace_xml, twincat_csv
 
 from hybridsep.base.errors import LogError
@@ -311,10 +311,10 @@ def test_refused_captures(tmp_path: Path, spoil: Callable[[dict[str, Any]], obje
         read_log(path)
 
 
-@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs ../shared/data/recordings beside the repository")
+@pytest.mark.skipif(not CAPTURE.is_file(), reason="needs ../shared/data/recordings beside the repository")
 @pytest.mark.parametrize(("axis", "file"), [(None, 1), ("X1", 1), ("2", 2)])
 def test_recorded_capture(axis: str | None, file: int) -> None:
-    log, same = read_log(RECORDINGS / "cnc_a_capture.json", axis=axis), read_log(RECORDINGS / f"cnc_a_axis{file}.csv")
+    log, same = read_log(CAPTURE, axis=axis), read_log(RECORDINGS / f"cnc_a_axis{file}.npz")
     np.testing.assert_allclose(log.x_d, same.x_d, atol=1e-12)
     np.testing.assert_allclose(log.x_meas, same.x_meas, atol=1e-12)
     np.testing.assert_allclose(log.t, same.t, atol=1e-12)
