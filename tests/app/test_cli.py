@@ -17,26 +17,6 @@ from hybridsep.base.version import version_text
 from hybridsep.evaluate.backtest import backtest
 
 
-@pytest.mark.slow
-def test_backtest_of_a_csv(hybridsep: Run, tmp_path: Path) -> None:
-    log = write_log(tmp_path / "log.csv", n=6001)
-    paper = ("-m", "spring_mass_damper", *predictor(averaging="false"))
-    status, out, _ = hybridsep("backtest", log, *paper, "--json")
-    summary = json.loads(out)
-    assert status == 0
-    assert summary["rms_pb_um"] == pytest.approx(33.94, abs=0.1)
-    assert summary["rms_h_um"] == pytest.approx(14.9, abs=0.4)
-    assert (summary["n_samples"], summary["n_batches"]) == (6001, 61)
-    status, out, _ = hybridsep("backtest", log, *paper)
-    assert status == 0
-    assert f"{summary['rms_h_um']:.4g}" in out
-    assert " ".join(summary["verdict"].split()) in " ".join(out.split())
-    assert summary["verdict"].startswith("Better than the physics model: 0.4")
-    status, out, _ = hybridsep("backtest", log, "-m", "spring_mass_damper", *predictor(averaging="true", t_init=0))
-    assert status == 0
-    assert "RMS" in out
-
-
 def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: Path) -> None:
     rows = write_log(tmp_path / "whole.csv", n=2000).read_text().splitlines()
     rows[1500] = rows[1500].rpartition(",")[0] + ","

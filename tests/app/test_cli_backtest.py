@@ -122,6 +122,8 @@ def test_the_page_has_the_figures_of_backtest(hybridsep: Run, log: Path, tmp_pat
     status, out, err = hybridsep("backtest", *options, "--report", page)
     assert status == 0, err
     assert f"wrote {page}" in out
+    assert f"{scores['rms_h_um']:.4g}" in out
+    assert " ".join(scores["verdict"].split()) in " ".join(out.split())
     text = page.read_text(encoding="utf-8")
     for name in ("rms_pb_um", "rms_hold_um", "rms_h_um"):
         assert f"<td>{scores[name]:.4g}</td>" in text

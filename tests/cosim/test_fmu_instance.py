@@ -166,7 +166,6 @@ UNREADABLE = r"Odd\.fmu is not a readable FMU: "
             of_description(lambda xml: re.sub(rb'guid="[^"]*"', b'guid="{0}"', xml)),
             r"Odd\.fmu cannot be instantiated: .*(?i:guid)",
         ),
-        (of_description(lambda xml: b"<html></html>"), UNREADABLE),
         (of_description(lambda xml: xml[:-40]), UNREADABLE),
         (
             of_description(lambda xml: xml.replace(b'causality="input"', b'causality="exput"')),
@@ -194,9 +193,7 @@ def test_what_is_no_fmu_is_said_in_a_line_and_leaves_nothing_behind(
     assert not list(temporary.iterdir())
 
 
-def test_archives_that_are_cut_damaged_or_for_another_platform(
-    native: Path, fmus: BuiltFmus, tmp_path: Path, temporary: Path
-) -> None:
+def test_archives_that_are_cut_or_damaged(native: Path, fmus: BuiltFmus, tmp_path: Path, temporary: Path) -> None:
     content, path = bytearray(native.read_bytes()), tmp_path / "Cut.fmu"
     with pytest.raises(FmuError, match=r"no FMU at .*Cut.fmu; build it first"):
         FmuInstance(path)
@@ -210,11 +207,6 @@ def test_archives_that_are_cut_damaged_or_for_another_platform(
     content[largest.header_offset + 200 + largest.compress_size // 2] ^= 0xFF
     path.write_bytes(content)
     with pytest.raises(FmuError, match=r"Cut\.fmu cannot be loaded: "):
-        FmuInstance(path)
-    with zipfile.ZipFile(native) as old, zipfile.ZipFile(path, "w") as new:
-        for name in old.namelist():
-            new.writestr(name.replace("linux64", "darwin64"), old.read(name))
-    with pytest.raises(FmuError, match=r"linux64/FeedDrive\.so is missing, there are binaries for darwin64"):
         FmuInstance(path)
     changed(fmus("FeedDrivePy"), path, lambda name, data: None if name.endswith("machine.json") else data)
     with pytest.raises(FmuError, match=r"Cut\.fmu cannot be instantiated: "):

@@ -1,8 +1,10 @@
 """Closed systems of native FMUs in other projects' importers, from one file; all but two of them run at night."""
 
 import os
+import re
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import importers
@@ -90,3 +92,20 @@ def test_the_script_of_the_guide(tmp_path: Path) -> None:
     place = written(tmp_path / "system", "predictor").parent
     printed = python(place, "-c", f"import importers; importers.load_tbb()\n{script}")
     assert f"| {' | '.join(f'{1e6 * float(number):#.4g}' for number in printed.split())} |" in GUIDE
+
+
+@pytest.mark.skipif(not exists_here("libcosim"), reason="libcosim has no library for this machine")
+def test_a_parameter_set_counts_in_libcosim(tmp_path: Path) -> None:
+    """Without the noise that its FMU starts with, what the drive measures is where it is."""
+    path, changed, ends = written(tmp_path / "system", "predictor"), tmp_path / "changed.ssp", []
+    noise = rb'(<ssv:Parameter name="noise_std">\s*<ssv:Real value=")5e-06'
+    with zipfile.ZipFile(path) as old, zipfile.ZipFile(changed, "w") as new:
+        for name in old.namelist():
+            text = old.read(name)
+            new.writestr(name, re.sub(noise, rb"\g<1>0.0", text) if name.endswith("_drive.ssv") else text)
+    for archive in (path, changed):
+        python(tmp_path, importers.__file__, "libcosim", "predictor", archive, 300, tmp_path / "rows.npy")
+        ends.append(np.load(tmp_path / "rows.npy")[-1, :2])
+    assert ends[0][0] != ends[0][1]
+    assert ends[1][0] == ends[1][1] == pytest.approx(ends[0][0], abs=1e-12)
+    assert np.all(np.asarray(ends) > 1e-3)

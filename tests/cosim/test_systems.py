@@ -1,8 +1,5 @@
 """``hybridsep system``: one file with FMUs, connections and parameters."""
 
-import re
-import subprocess
-import sys
 import zipfile
 from importlib import import_module
 from pathlib import Path
@@ -11,7 +8,6 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from importers import exists_here
 
 from hybridsep import FmuInstance, load_machine, staircase
 from hybridsep.fmi.archive import build_fmu
@@ -156,33 +152,3 @@ def test_the_same_system_has_the_same_bytes(tmp_path: Path) -> None:
     assert paths[0].read_bytes() == paths[1].read_bytes()
     fmu = build_fmu(machine, "HybridPredictor", tmp_path, targets=("host",), windows=False)
     assert content(paths[0])["resources/HybridPredictor.fmu"] == fmu.read_bytes()
-
-
-@pytest.mark.skipif(not exists_here("libcosim"), reason="libcosim has no library for this machine")
-def test_a_parameter_set_counts_in_libcosim(tmp_path: Path) -> None:
-    """Without the noise that its FMU starts with, what the drive measures is where it is."""
-    path = build_system(load_machine("spring_mass_damper"), tmp_path / "a.ssp", staircase()[:500], targets=("host",))
-    files, changed = content(path), tmp_path / "changed.ssp"
-    noise = rb'(<ssv:Parameter name="noise_std">\s*<ssv:Real value=")5e-06'
-    with zipfile.ZipFile(changed, "w") as archive:
-        for name, text in files.items():
-            archive.writestr(name, re.sub(noise, rb"\g<1>0.0", text) if name.endswith("_drive.ssv") else text)
-    script = """
-import sys
-from libcosimpy.CosimExecution import CosimExecution
-from libcosimpy.CosimObserver import CosimObserver
-execution, observer = CosimExecution.from_ssp_file(sys.argv[1], 1000000), CosimObserver.create_last_value()
-execution.add_observer(observer)
-execution.step(300)
-drive = execution.slave_index_from_instance_name("drive")
-places = {v.name.decode(): v.reference for v in execution.slave_variables(drive)}
-print("ends", *observer.last_real_values(drive, [places["x"], places["x_meas"]]))
-"""
-    ends = []
-    for system in (path, changed):
-        done = subprocess.run([sys.executable, "-c", script, str(system)], capture_output=True, text=True, check=True)
-        (line,) = re.findall(r"^ends (.*)$", done.stdout, re.MULTILINE)  # libcosim prints its log there, too
-        ends.append([float(number) for number in line.split()])
-    assert ends[0][0] != ends[0][1]
-    assert ends[1][0] == ends[1][1] == pytest.approx(ends[0][0], abs=1e-12)
-    assert np.all(np.asarray(ends) > 1e-3)

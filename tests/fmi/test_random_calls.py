@@ -1,4 +1,4 @@
-"""The native FMUs' sources: random calls and tables under sanitizers, and each file compiled alone."""
+"""The native FMUs' sources under sanitizers: random calls and tables."""
 
 import os
 import shutil
@@ -12,20 +12,16 @@ import fuzz_fmi
 import pytest
 from c_compiler import (
     C_SOURCES,
-    FMI_HEADERS,
     SANITISED,
     address_sanitizer,
     needs_sanitisers,
     run_compiler,
     sanitising_compiler,
 )
-from c_core import STAGE_DRIVE, object_files
+from c_core import object_files
 from places import ROOT
 
-from hybridsep.fmi.c_header import c_header, c_sources
 from hybridsep.fmi.compile import _sources
-from hybridsep.fmi.variables import FmuTable
-from hybridsep.machines.machine import load_machine
 
 FUZZED = {
     "SepCompensator": 0.9,
@@ -89,27 +85,3 @@ def test_random_calls_under_sanitizers(
 
     with ThreadPoolExecutor(len(models)) as pool:
         assert not "".join(pool.map(findings, models))
-
-
-@pytest.mark.slow
-def test_each_source_of_an_adapter_compiles_alone_without_warnings(tmp_path: Path) -> None:
-    """The core's do in every build of the tests' libraries, and all of both versions as one file by clang (TwinCAT)."""
-    machine, mode = load_machine("spring_mass_damper"), {"f_n": 25.0, "zeta": 0.05, "alpha": 1.0, "beta": 0.0}
-    predictor = FmuTable("HybridPredictor", "Predictor", machine.fmi_parameters(), (mode,))
-    compensator = FmuTable("SepCompensator", "Compensator", machine.fmi_compensator_parameters(), (mode,))
-    stage = FmuTable("FeedDrive", "Stage", STAGE_DRIVE, (mode,))
-    core, files = {path.name for path in (C_SOURCES / "core").rglob("*.c")}, list[Path]()
-    for table, fmi in ((compensator, "2"), (stage, "2"), (predictor, "3")):
-        folder = tmp_path / table.name
-        folder.mkdir()
-        for file, content in {**c_sources((fmi,)), "hsep_fmu.h": c_header(table, "{}", fmi).encode()}.items():
-            (folder / file).write_bytes(content)
-        files += [path for path in folder.glob("*.c") if path.name not in core | {"all.c"}]
-    assert len(files) > 40
-
-    def compile_alone(path: Path) -> None:
-        # What gcc warns of it finds while it optimises
-        run_compiler(["-O1", "-isystem", FMI_HEADERS, "-c", path, "-o", path.with_suffix(".o")])
-
-    with ThreadPoolExecutor() as pool:
-        list(pool.map(compile_alone, files))

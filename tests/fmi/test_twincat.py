@@ -10,14 +10,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import fmpy
-import numpy as np
 import pytest
 from built_once import BuiltFmus
 from c_compiler import FMI_HEADERS, run_compiler
 from command_line import Run
+from library_models import trained_state
 from places import ROOT
 
-from hybridsep import backtest, load_machine
 from hybridsep.fmi.controllers import CONFIGURATION_FILE, DEFINITIONS
 
 STAND_INS = ROOT / "tests" / "c" / "msvc"
@@ -58,11 +57,7 @@ def test_the_configuration_lies_beside_the_fmus(hybridsep: Run, tmp_path: Path) 
 
 @pytest.mark.slow
 def test_weights_are_compiled_in(hybridsep: Run, tmp_path: Path) -> None:
-    machine = load_machine("spring_mass_damper")
-    predictor, command = machine.new_predictor(), np.linspace(0.0, 0.01, 400)
-    backtest(predictor, command, command)
-    predictor.save(tmp_path / "trained.state")
-    fmu, _ = built(hybridsep, tmp_path / "out", "HybridPredictor", "--weights", tmp_path / "trained.state")
+    fmu, _ = built(hybridsep, tmp_path / "out", "SepCompensator", "--weights", trained_state("SepCompensator"))
     header = unpacked(fmu, tmp_path / "fmu") / "hsep_fmu.h"
     assert "hsep_embedded_weights" in header.read_text(encoding="utf-8")
 

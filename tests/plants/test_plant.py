@@ -1,7 +1,6 @@
 """Plants: against a tight solve_ivp run, against the linear model, and the noise against its definition."""
 
 import math
-from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -11,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from hybridsep import Encoder, ModalModel, Mode, load_machine, simulate
-from hybridsep.base.errors import ParameterError, SignalError
+from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.signals import Array
 from hybridsep.plants.feed_drive import FeedDrive
@@ -179,19 +178,6 @@ def test_velocity_is_the_derivative_of_the_position() -> None:
         assert (plant.x - before) / 1e-6 == pytest.approx(v, rel=1e-3)
 
 
-def test_any_step_from_any_start_gives_the_same_motion() -> None:
-    x_d = staircase()[:300]
-    for name in ("spring_mass_damper", "als25010_x"):
-        plant = load_machine(name).new_plant()
-        whole = simulate(plant, x_d, TS)
-        np.testing.assert_allclose(simulate(plant, x_d + 0.1, TS) - 0.1, whole, atol=1e-14)
-        plant.reset(0.0)
-        for k, r in enumerate(x_d):
-            assert plant.x == pytest.approx(whole[k], abs=1e-9)
-            for _ in range(4):  # the friction's v_d is taken once a sampling interval, not once a step
-                plant.step(r, TS / 4)
-
-
 def test_encoder_draws_split_mix_64_and_box_muller() -> None:
     # The first numbers of SplitMix64 from seed 0, as published with the generator
     first, second = 0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4
@@ -210,18 +196,9 @@ def test_encoder_noise_is_normal_and_seeded() -> None:
     assert np.array_equal(noise, Encoder(1.0, 7).measure_all(np.zeros(20_000)))
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: FeedDrive(1.0, 1.0, 1.0).step(0.0, 0.0), r"step size must be > 0 and ≤ 100 s, got 0\.0"),
-        (lambda: simulate(FeedDrive(1.0, 1.0, 1.0), [], TS), "x_d must have at least one sample, got none"),
-        (lambda: StageDrive(ModalModel([Mode(5e4, 0.5, 1.0)])), r"2 pi f_n .* of mode\[1\] must be at most 100000 1/s"),
-        (lambda: Encoder(-1.0), "noise_std must be 0 … 1 m, got -1"),
-    ],
-)
-def test_what_cannot_be_is_refused(make: Callable[[], object], message: str) -> None:
-    with pytest.raises((ParameterError, SignalError), match=message):
-        make()
+def test_no_samples_are_refused() -> None:
+    with pytest.raises(SignalError, match="x_d must have at least one sample, got none"):
+        simulate(FeedDrive(1.0, 1.0, 1.0), [], TS)
 
 
 @pytest.mark.parametrize(("name", "changes"), [("spring_mass_damper", {"c_nl": 1e4}), ("als25010_x", {"kappa": 1e2})])
