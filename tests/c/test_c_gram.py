@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from stream import PREDICTOR
 
 from hybridsep.base.signals import Array
 from hybridsep.predict.regression import RidgeRegression
@@ -31,7 +32,7 @@ class CGram:
     """hsep_gram."""
 
     def __init__(self, n: int) -> None:
-        self.library, self.n = c_core.library("predictor"), n
+        self.library, self.n = c_core.library(PREDICTOR), n
         self.library.hsep_gram_size.restype = self.library.hsep_gram_square.restype = ctypes.c_double
         self.library.hsep_gram_row.restype = ctypes.POINTER(ctypes.c_double)
         self.block = np.zeros(int(self.library.hsep_gram_size(ctypes.c_uint64(n))) // 8)

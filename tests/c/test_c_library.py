@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import asdict
 from itertools import product
 from pathlib import Path
 
@@ -13,11 +14,12 @@ import numpy as np
 import pytest
 import staircase_data as staircase
 from c_compiler import C_SOURCES, compiler, include_flags
-from c_core import SPRING_MASS_DAMPER, STAGE_MODES, CModel
+from c_core import CModel
 from c_library import Library, configured, installed
 from library_models import trained_state
 from places import ROOT
 from spoiled_weights import spoiled
+from stream import STAGE_COMPENSATOR, machine_of
 
 from hybridsep.base.settings import PARAMETERS, PredictorSettings
 from hybridsep.base.signals import Array
@@ -27,13 +29,14 @@ from hybridsep.machines.machine import load_machine
 from hybridsep.plants.plant import simulate
 from hybridsep.predict.predictor import HybridPredictor
 
+MODE = asdict(load_machine("spring_mass_damper").model.modes[0])
 CONSUMER = ROOT / "tests" / "c" / "consumer"
 KINDS = {"predictor": {**PREDICTOR_SETTINGS, **AVERAGING_SETTINGS}}
 KINDS["compensator"] = {**KINDS["predictor"], **COMPENSATOR_SETTINGS}
 
 
 def library(kind: str = "predictor", /, **settings: float) -> Library:
-    return Library(kind, settings, [SPRING_MASS_DAMPER])
+    return Library(kind, settings, [MODE])
 
 
 def program(path: Path, *arguments: object) -> str:
@@ -96,7 +99,7 @@ def test_parameters_that_do_not_fit_together_are_refused() -> None:
     assert Library("predictor", {"Np": 20, "p": 20}, []).refused() == "modes"
     for name in ("f_n", "zeta", "alpha", "beta"):
         for value in (math.nan, 2 * PARAMETERS[name].maximum):
-            assert Library("predictor", {}, [SPRING_MASS_DAMPER, {**SPRING_MASS_DAMPER, name: value}]).refused() == name
+            assert Library("predictor", {}, [MODE, {**MODE, name: value}]).refused() == name
 
 
 def test_defaults_are_the_declared_ones() -> None:
@@ -116,10 +119,11 @@ def test_defaults_are_the_declared_ones() -> None:
 def test_outputs_are_the_models(averaging: int) -> None:
     """The interface without FMI computes what an FMU does, to the last bit."""
     x_d = staircase.commanded()[:700]
-    settings = {"Np": 50, "p": 10, "preview": 100, "averaging": averaging}
-    compensator = Library("compensator", settings, STAGE_MODES)
+    settings, machine = {"p": 10, "preview": 100, "averaging": averaging}, machine_of(STAGE_COMPENSATOR)
+    modes = [asdict(mode) for mode in machine.model.modes]
+    compensator = Library("compensator", {**machine.fmi_compensator_parameters(), **settings}, modes)
     assert compensator.begin(float(x_d[0])) == 0
-    model = CModel("compensator_2", {**settings, "x_d_ahead": x_d[0], "x_meas": x_d[0]}).initialise()
+    model = CModel(STAGE_COMPENSATOR, {**settings, "x_d_ahead": x_d[0], "x_meas": x_d[0]}).initialise()
     for k, x_d_ahead in enumerate(x_d):
         x_meas, x_load = x_d[max(0, k - 101)] + 1e-5 * math.sin(0.1 * k), 1e-4 * math.cos(0.03 * k)
         model["x_d_ahead"], model["x_meas"], model["x_load"] = x_d_ahead, x_meas, x_load

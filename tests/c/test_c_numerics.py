@@ -10,6 +10,7 @@ import oracle
 import pytest
 import staircase_data as staircase
 from c_core import TS
+from stream import PREDICTOR
 
 from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel
@@ -53,7 +54,7 @@ def test_a_mode_is_discretised_to_the_last_digits(damping: str, hold: str) -> No
     # Against forty digits: each matrix to 1e-14 of its largest entry, the entries that are not tiny to 1e-13 of
     # themselves.
     mode = DiscreteMode()
-    c_core.library("predictor").hsep_discretise(
+    c_core.library(PREDICTOR).hsep_discretise(
         ctypes.byref(mode), (ctypes.c_double * 4)(*MODES[damping]), ctypes.c_double(TS), ctypes.c_int(hold == "foh")
     )
     for name, entries in exact_matrices(*MODES[damping], hold).items():
@@ -66,7 +67,7 @@ class CRegression:
     """hsep_regression."""
 
     def __init__(self, n: int, lam: float) -> None:
-        self.library, self.n = c_core.library("predictor"), n
+        self.library, self.n = c_core.library(PREDICTOR), n
         self.block = np.zeros(int(self.library.hsep_regression_size(ctypes.c_uint64(n))) // 8)
         self.library.hsep_regression_init(self._block, ctypes.c_uint64(n), ctypes.c_double(lam))
 

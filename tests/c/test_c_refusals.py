@@ -11,31 +11,33 @@ import pytest
 from c_compiler import C_SOURCES, include_flags, run_compiler
 from c_core import CModel, refusal, write_trajectory
 from places import ROOT
+from stream import COMPENSATOR, PLANTS, PREDICTOR, STAGE_PREDICTOR, TRAJECTORY, table_of_model
 
 
 def test_a_number_that_is_not_whole_is_refused() -> None:
-    assert refusal(CModel("predictor", {"p": 2.5}).size) == "p must be a whole number, got 2.5"
+    assert refusal(CModel(PREDICTOR, {"p": 2.5}).size) == "p must be a whole number, got 2.5"
 
 
 def test_many_problems_are_cut_off_within_the_message() -> None:
-    wrong = {key: math.nan for key in CModel("predictor_2").place if key.startswith("mode[") or key in c_core.PREDICTOR}
-    message = refusal(CModel("predictor_2", wrong).size)
+    parameters = table_of_model(STAGE_PREDICTOR).parameters
+    wrong = {key: math.nan for key in CModel(STAGE_PREDICTOR).place if key.startswith("mode[") or key in parameters}
+    message = refusal(CModel(STAGE_PREDICTOR, wrong).size)
     assert message.startswith("Np must be finite, got nan; p must be finite, got nan; ")
-    message = refusal(CModel("predictor_2", dict.fromkeys(wrong, -1.2345678901234567e-5)).size)
+    message = refusal(CModel(STAGE_PREDICTOR, dict.fromkeys(wrong, -1.2345678901234567e-5)).size)
     assert 450 < len(message.encode()) < c_core.MESSAGE_SIZE
 
 
 def test_resources_that_do_not_fit_are_refused(tmp_path: Path) -> None:
-    file = tmp_path / "trajectory_3.bin"
-    assert refusal(CModel("trajectory").size) == "trajectory_3.bin must be in the resources (none) and readable"
-    assert "must be in the resources" in refusal(CModel("trajectory", resources=tmp_path).size)
+    file = tmp_path / "trajectory_0.bin"
+    assert refusal(CModel(TRAJECTORY).size) == "trajectory_0.bin must be in the resources (none) and readable"
+    assert "must be in the resources" in refusal(CModel(TRAJECTORY, resources=tmp_path).size)
     write_trajectory(tmp_path, np.arange(5.0), 2e-3)
-    model = CModel("trajectory", resources=tmp_path)
-    assert refusal(model.size) == "T_s must be 0.002 s, the interval of trajectory_3.bin, got 0.001"
+    model = CModel(TRAJECTORY, resources=tmp_path)
+    assert refusal(model.size) == "T_s must be 0.002 s, the interval of trajectory_0.bin, got 0.001"
     model.start_values()
     assert model["r"] == 0.0
     write_trajectory(tmp_path, np.array([1.0, math.nan]))
-    assert refusal(model.initialise) == "trajectory_3.bin must be finite, got nan at sample 1"
+    assert refusal(model.initialise) == "trajectory_0.bin must be finite, got nan at sample 1"
     write_trajectory(tmp_path, np.arange(5.0))
     good = file.read_bytes()
     for bad in (b"", good[:20], good[:-1], good[:24], b"X" + good[1:], good + b"\0" * 8):
@@ -43,7 +45,7 @@ def test_resources_that_do_not_fit_are_refused(tmp_path: Path) -> None:
         assert "it is damaged or truncated" in refusal(model.size)
 
 
-@pytest.mark.parametrize("name", ["predictor", "compensator", "feed_drive", "stage_drive", "trajectory"])
+@pytest.mark.parametrize("name", [PREDICTOR, COMPENSATOR, *PLANTS, TRAJECTORY])
 def test_memory_of_another_size_is_refused(name: str, tmp_path: Path) -> None:
     write_trajectory(tmp_path, np.arange(5.0))
     model = CModel(name, resources=tmp_path)

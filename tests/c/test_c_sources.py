@@ -10,6 +10,7 @@ import elf
 import pytest
 from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
 from places import ROOT
+from stream import COMPENSATOR, TRAJECTORY
 
 from hybridsep.fmi.c_header import all_c
 
@@ -49,12 +50,12 @@ def test_the_core_needs_libm_alone() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["compensator_2", "trajectory"])
+@pytest.mark.parametrize("name", [COMPENSATOR, TRAJECTORY])
 def test_everything_compiles_as_one_file(name: str) -> None:
     """Optimised once: the models differ in a table and in which of the core's functions they call."""
     folder = build_folder() / f"all_{name}"
     c_core.write_header(name, folder)
     everything = folder / "all.c"
     everything.write_text(all_c(c_core.sources()))
-    level = "-O3" if name == "compensator_2" else "-O0"
+    level = "-O3" if name == COMPENSATOR else "-O0"
     run_compiler([level, f"-I{folder}", *include_flags(), "-c", everything, "-o", folder / "all.o"])

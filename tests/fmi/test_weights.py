@@ -4,7 +4,6 @@ import zipfile
 from dataclasses import replace
 from pathlib import Path
 
-import c_core
 import fmpy
 import numpy as np
 import pytest
@@ -12,14 +11,13 @@ from c_core import CModel, refusal
 from command_line import Run
 from library_models import trained_state
 from spoiled_weights import spoiled
+from stream import PREDICTOR
 
 from hybridsep.base.errors import FmuError, StateError
-from hybridsep.base.settings import PredictorSettings
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.weights import restore_weights, weights_file
 from hybridsep.machines.machine import load_machine, paper_machine
-from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
 MACHINE = paper_machine("spring_mass_damper")
@@ -85,7 +83,7 @@ SMALL = {"p": 4, "q": 2, "Np": 20, "averaging": 1}
 def small_predictor(n_windows: int = 0) -> HybridPredictor:
     """Return a predictor of the default machine with short windows that has learned."""
     settings = replace(MACHINE.predictor_settings, p=4, q=2, Np=20, averaging=True)
-    predictor = HybridPredictor(ModalModel([Mode(**c_core.SPRING_MASS_DAMPER)]), settings, start=0.0)
+    predictor = HybridPredictor(MACHINE.model, settings, start=0.0)
     for k in range(n_windows):
         command = 1e-3 * np.sin(0.01 * np.arange(20 * k, 20 * k + 20))
         predictor.predict(command)
@@ -95,7 +93,7 @@ def small_predictor(n_windows: int = 0) -> HybridPredictor:
 
 def test_spoiled_files_are_refused_in_both_flavours() -> None:
     content, predictor = weights_file(small_predictor(20)), small_predictor()
-    model = CModel("predictor", SMALL)
+    model = CModel(PREDICTOR, SMALL)
     damaged, other = spoiled(content)
     for name, changed in (damaged | other).items():
         with pytest.raises(StateError):
@@ -105,13 +103,12 @@ def test_spoiled_files_are_refused_in_both_flavours() -> None:
         assert "damaged, truncated or from another version" in said if name in damaged else "weights.bin" in said, name
     assert predictor.regression.n_rows == 0.0
     model.learn(content)
-    assert model.initialise().state.tobytes() != CModel("predictor", SMALL).initialise().state.tobytes()
+    assert model.initialise().state.tobytes() != CModel(PREDICTOR, SMALL).initialise().state.tobytes()
 
 
 def test_another_number_of_modes_is_named() -> None:
-    stage = [Mode(**mode) for mode in c_core.TABLES["predictor_2"].modes]
-    learned = HybridPredictor(ModalModel(stage), PredictorSettings.from_fmi(c_core.PREDICTOR))
-    said = refusal(CModel("predictor", weights=weights_file(learned)).initialise)
+    learned = HybridPredictor(load_machine("als25010_x").model, MACHINE.predictor_settings)
+    said = refusal(CModel(PREDICTOR, weights=weights_file(learned)).initialise)
     assert "the number of modes must be 4, with which this FMU was trained (weights.bin), got 1" in said
 
 

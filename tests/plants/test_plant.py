@@ -5,9 +5,10 @@ from itertools import product
 
 import numpy as np
 import pytest
-from c_core import STAGE_DRIVE, STAGE_MODES, CModel
+from c_core import CModel
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from stream import STAGE
 
 from hybridsep import Encoder, ModalModel, Mode, load_machine, simulate
 from hybridsep.base.errors import SignalError
@@ -125,7 +126,7 @@ def test_without_nonlinearity_the_plants_are_their_models() -> None:
 )
 def test_a_stage_delays_and_holds_the_command_as_its_model(hold: str, dead_time: int, friction_on: str) -> None:
     x_d = staircase()[:600] + 0.1
-    model = ModalModel([Mode(**mode) for mode in STAGE_MODES], dead_time)
+    model = ModalModel(load_machine("als25010_x").model.modes, dead_time)
     discrete = model.discretise(TS, hold)
     x_pb = discrete.forced_response(discrete.rest(), x_d - x_d[0])[0] + x_d[0]
     plant = StageDrive(model, T_s=TS, input_hold=hold)
@@ -134,9 +135,9 @@ def test_a_stage_delays_and_holds_the_command_as_its_model(hold: str, dead_time:
     held = np.max(np.abs(simulate(StageDrive(model, T_s=TS), x_d, TS) - x_pb))
     assert np.max(np.abs(x - x_pb)) < (0.25 * held if (hold, dead_time) == ("foh", 0) else 1e-9)
     assert np.max(np.abs(x - x_d)) > 1e-5
-    values = {**STAGE_DRIVE, "f": 8e-6, "v_friction": 5e-3, "noise_std": 0.0, "dead_time": dead_time}
+    values = {"f": 8e-6, "kappa": 0.0213165, "v_friction": 5e-3, "noise_std": 0.0, "dead_time": dead_time}
     chosen = {"input_hold": ["zoh", "foh"].index(hold), "friction_on": ["command", "motion"].index(friction_on)}
-    core = CModel("stage_drive", {**values, **chosen})
+    core = CModel(STAGE, {**values, **chosen})
     core["x_d"] = x_d[0]
     core.start_values()
     core.initialise(0.0)

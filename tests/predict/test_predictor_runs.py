@@ -3,12 +3,13 @@
 import math
 from collections.abc import Callable
 
-import c_core
 import numpy as np
 import pytest
 import staircase_data as staircase
-from library_models import library_compensator, numbered, runaway_predictor
+from library_models import library_compensator, runaway_predictor
+from library_stream import start_values
 from predictor_cases import MODEL, replay, small_signals, trained
+from stream import COMPENSATOR
 
 from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import PredictorSettings
@@ -152,7 +153,7 @@ def test_a_replay_that_diverges_is_refused() -> None:
 
 
 def test_a_plan_that_diverges_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    values = {**c_core.COMPENSATOR, **numbered([c_core.SPRING_MASS_DAMPER]), "t_init": 0.0}
+    values = {**start_values(COMPENSATOR), "averaging": False, "Np": 100, "t_init": 0.0}
     look_ahead = LookAhead(library_compensator(values), 0.0)
     diverging = Prediction(np.full(100, np.inf), np.zeros(100), np.zeros(100), 0)
     monkeypatch.setattr(look_ahead.predictor, "predict", lambda *_, **__: diverging)

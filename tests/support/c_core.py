@@ -5,7 +5,6 @@ import hashlib
 import struct
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,11 @@ import pytest
 from built_once import built_once, shared_builds
 from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
 from places import ROOT
+from stream import table_of_model
 
-from hybridsep.base.parameters import Parameter
 from hybridsep.base.signals import Array
 from hybridsep.fmi.c_header import c_header
-from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, INTERPOLATED, PREDICTOR_SETTINGS, FmuTable
-from hybridsep.machines.machine import load_machine
+from hybridsep.fmi.variables import INTERPOLATED, FmuTable
 
 TS = 1e-3  # s
 
@@ -28,47 +26,13 @@ EXPOSE = ROOT / "tests" / "c" / "expose.c"
 MESSAGE_SIZE = 512
 
 
-def defaults(table: Mapping[str, Parameter]) -> dict[str, float]:
-    """Return the default values of parameters as an FMU has them."""
-    return {name: parameter.to_fmi(parameter.default) + 0 for name, parameter in table.items()}
+TABLES: dict[str, FmuTable] = {}
+"""Tables of models that are no machine's FMU, by name."""
 
 
-SPRING_MASS_DAMPER = {"f_n": np.sqrt(24674.0) / (2 * np.pi), "zeta": 15.7 / (2 * np.sqrt(24674.0))} | {
-    "alpha": 24674.0,
-    "beta": 15.7,
-}
-"""The staircase drive's linear part, as one mode of eq. (15)."""
-
-STAGE_MODES = tuple(asdict(mode) for mode in load_machine("als25010_x").model.modes)  # the stage's X axis, Table 1
-PREDICTOR = {**defaults({**PREDICTOR_SETTINGS, **AVERAGING_SETTINGS}), "averaging": 0}  # the paper's model
-FEED_DRIVE = {"m": 1.0, "c": 15.7, "k": 24674.0, "c_nl": 100.0, "k_nl": 1000.0, "noise_std": 5e-6, "seed": 0}
-STAGE_DRIVE = {
-    "f": 1.4211e-5,
-    "kappa": 0.0213165,
-    "friction_on": 0,
-    "v_friction": 2e-3,
-    "T_s": 1e-3,
-    "dead_time": 0,
-    "input_hold": 0,
-    "noise_std": 1e-6,
-    "seed": 7,
-}
-
-COMPENSATOR = {**defaults({**PREDICTOR_SETTINGS, **AVERAGING_SETTINGS, **COMPENSATOR_SETTINGS}), "averaging": 0}
-
-TABLES: dict[str, FmuTable] = {
-    table.name: table
-    for table in (
-        FmuTable("HybridPredictor", "predictor", PREDICTOR, (SPRING_MASS_DAMPER,)),
-        FmuTable("HybridPredictor", "predictor_2", PREDICTOR, STAGE_MODES),
-        FmuTable("FeedDrive", "feed_drive", FEED_DRIVE),
-        FmuTable("FeedDrive", "stage_drive", STAGE_DRIVE, STAGE_MODES),
-        FmuTable("SepCompensator", "compensator", COMPENSATOR, (SPRING_MASS_DAMPER,)),
-        FmuTable("SepCompensator", "compensator_2", COMPENSATOR, STAGE_MODES),
-        FmuTable("ReferenceTrajectory", "trajectory", {"trajectory": 3, "T_s": 1e-3}),
-    )
-}
-"""Tables of the models built here, by name."""
+def table_of(name: str) -> FmuTable:
+    """Return one of :data:`TABLES`, or that of an FMU of this name."""
+    return TABLES.get(name) or table_of_model(name)
 
 
 def sources() -> list[str]:
@@ -107,9 +71,9 @@ def object_files(flags: tuple[str, ...] = ("-O1", "-fPIC"), command: tuple[str, 
 
 
 def write_header(name: str, folder: Path) -> None:
-    """Write hsep_fmu.h of one of :data:`TABLES`."""
+    """Write a model's hsep_fmu.h."""
     folder.mkdir(exist_ok=True)
-    (folder / "hsep_fmu.h").write_text(c_header(TABLES[name], "{test}"), encoding="utf-8")
+    (folder / "hsep_fmu.h").write_text(c_header(table_of(name), "{test}"), encoding="utf-8")
 
 
 class Context(ctypes.Structure):
@@ -129,7 +93,7 @@ class Context(ctypes.Structure):
 
 @cache
 def library(name: str) -> ctypes.CDLL:
-    """Return the shared library of one of :data:`TABLES`, built when first asked for, once a session."""
+    """Return the shared library of a model, built when first asked for, once a session."""
     folder = build_folder() / name
     write_header(name, folder)
     key = hashlib.sha256((folder / "hsep_fmu.h").read_bytes()).hexdigest()[:16]
@@ -153,8 +117,8 @@ class RefusedError(Exception):
 class CModel:
     """One instance of a model, as an adapter holds it.
 
-    ``name``: of :data:`TABLES`; ``start``: values that differ from the table's start values; ``resources``: resources
-    folder; ``weights``: content of ``weights.bin``, with which it starts.
+    ``name``: of its FMU, or of :data:`TABLES`; ``start``: values that differ from its start values; ``resources``:
+    resources folder; ``weights``: content of ``weights.bin``, with which it starts.
     """
 
     def __init__(
@@ -165,9 +129,9 @@ class CModel:
         weights: bytes | None = None,
     ) -> None:
         self.library = library(name)
-        table = TABLES[name].variables
+        model, table = table_of(name).model, table_of(name).variables
         self.place = {variable.name: i for i, variable in enumerate(table)}
-        slopes = INTERPOLATED[TABLES[name].model]
+        slopes = INTERPOLATED[model]
         self.slope_place = {slope: len(table) + self.place[slope] for slope in slopes}
         self.values: Array = np.array([float(variable.start or 0.0) for variable in table] + [0.0] * len(slopes))
         self.context = Context.from_buffer_copy(self.library.test_table().contents)
@@ -237,9 +201,9 @@ class CModel:
 
 
 def write_trajectory(folder: Path, samples: Array, T_s: float = TS) -> None:
-    """Write ``trajectory_3.bin`` into a resources folder."""
+    """Write ``trajectory_0.bin`` into a resources folder."""
     head = b"HSEPTRJ1" + struct.pack("<Qd", len(samples), T_s)
-    (folder / "trajectory_3.bin").write_bytes(head + samples.astype("<f8").tobytes())
+    (folder / "trajectory_0.bin").write_bytes(head + samples.astype("<f8").tobytes())
 
 
 def refusal(action: Callable[[], Any]) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 from built_once import built_once, shared_builds
 from c_compiler import C_SOURCES
 from c_core import library as core_library
+from stream import STAGE_COMPENSATOR
 
 from hybridsep.base.parameters import Parameter
 from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
@@ -135,7 +136,7 @@ class CompensatorOutputs(ctypes.Structure):
 @cache
 def interface() -> ctypes.CDLL:
     """Return the core's functions, from a shared library that other tests need as well."""
-    loaded = core_library("compensator_2")
+    loaded = core_library(STAGE_COMPENSATOR)
     for kind in ("predictor", "compensator"):
         for function in ("size", "weights"):
             getattr(loaded, f"hsep_{kind}_{function}").restype = ctypes.c_size_t

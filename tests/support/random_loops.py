@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from c_core import COMPENSATOR, TS
+from c_core import TS
 from stream import OUTPUTS, Array, Stream, kind_of, machine_of
 
 from hybridsep.plants.plant import Encoder
@@ -63,7 +63,7 @@ def random_loop(seed: int, n: int, **fixed: float) -> RandomLoop:
     stops = np.cumsum(np.concatenate(([0.0], rng.uniform(-0.01, 0.01, 30))))
     r = rest_to_rest(stops, PAPER_LIMITS, TS, dwell=float(rng.uniform(0, 0.3)))[:n]
     start = float(rng.choice([0.0, 0.1]))
-    return RandomLoop({**COMPENSATOR, **values, **fixed}, r + start, int(rng.integers(1000)))
+    return RandomLoop({"averaging": 0, "horizon": 0, **values, **fixed}, r + start, int(rng.integers(1000)))
 
 
 def run(stream: Stream, loop: RandomLoop, *, nudged: bool = False) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from built_once import BuiltFmus
-from c_core import TABLES, CModel, RefusedError, write_trajectory
+from c_core import CModel, RefusedError, write_trajectory
 from library_models import learned_file
 from library_stream import LookAheadStream, PlantStream
 from stream import (
@@ -31,7 +31,6 @@ from stream import (
     Value,
     kind_of,
     machine_of,
-    table_of_model,
 )
 
 from hybridsep.base.errors import FmuError
@@ -52,7 +51,6 @@ class CoreStream:
     """
 
     def __init__(self, model: str, resources: Path, learned: bytes | None = None) -> None:
-        TABLES.setdefault(model, table_of_model(model))
         self.model = model
         self._kind = f"core {model}"
         self._start = {"t_init": 0.0} if learned else {}
@@ -218,7 +216,6 @@ class StreamMaker:
             return PlantStream(model) if "FeedDrive" in model else LookAheadStream(model, learned)
         if model == TRAJECTORY:
             write_trajectory(folder, staircase())
-            (folder / "trajectory_3.bin").rename(folder / "trajectory_0.bin")
         return CoreStream(model, folder, learned)
 
 

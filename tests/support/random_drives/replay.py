@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 from c_core import TABLES, CModel, RefusedError
+from stream import PREDICTOR, table_of_model
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
@@ -55,8 +56,8 @@ def core_outputs(
     used = PREDICTORS[predictor](settings)
     Np, n, modes = used.Np, len(x_d), model.modes
     name = f"predictor of {len(modes)} modes"
-    any_modes = TABLES["predictor"].modes * len(modes)
-    TABLES.setdefault(name, replace(TABLES["predictor"], name=name, modes=any_modes))
+    one = table_of_model(PREDICTOR)
+    TABLES.setdefault(name, replace(one, name=name, modes=one.modes * len(modes)))
     start = {f"mode[{i}].{key}": value for i, mode in enumerate(modes, 1) for key, value in asdict(mode).items()}
     start |= {**used.to_fmi(), "dead_time": model.dead_time, "x_d_ahead": x_d[0], "x_meas": x_d[0]}
     core = CModel(name, start).initialise()
