@@ -100,9 +100,11 @@ def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:
     status, out, _ = hybridsep("backtest", log, "-m", rotary, "--json")
     assert status == 0
     assert json.loads(out)["rms_h_urad"] == pytest.approx(expected["rms_h_um"], rel=1e-6)
-    assert "RMS [mdeg]" in hybridsep("backtest", log, "-m", rotary)[1]
+    shown = hybridsep("backtest", log, "-m", rotary)[1]
+    assert "RMS [mdeg]" in shown
+    assert "rad" not in shown
     # Where nothing is stated, the positions are in the machine's unit.
-    status, out, _ = hybridsep("backtest", tmp_path / "m.csv", "-m", rotary, "--x", "x", "--json")
+    status, out, _ = hybridsep("backtest", tmp_path / "m.csv", "-m", linear, "--set", "unit=rad", "--json")
     assert json.loads(out)["rms_h_urad"] == pytest.approx(expected["rms_h_um"], rel=1e-9)
     status, _, err = hybridsep("backtest", log, "-m", linear, "--x", "angle")
     assert status == 2

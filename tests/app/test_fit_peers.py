@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import Run, predictor, write_rows
+from command_line import Run, write_rows
 from oracle import arx_by_definition, free_run_by_definition
 from places import RECORDINGS
 from plotly.offline import get_plotlyjs
@@ -137,19 +137,3 @@ def test_positions_and_errors_are_shown_in_the_family_of_the_files_unit(
 def test_a_unit_of_the_other_kind_is_not_shown() -> None:
     assert shown_of("deg", "rad") == shown_in("deg")
     assert shown_of("m", "rad") == shown_of("", "rad") == shown_in("rad")
-
-
-@pytest.mark.slow
-def test_commands_on_a_log_in_degrees_speak_of_degrees(
-    hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    log = write_rows(
-        tmp_path / "axis.csv", 3000 * commanded()[:1200], 3000 * measured(0)[:1200], header="t,x_d/deg,x/deg"
-    )
-    monkeypatch.setattr("os.cpu_count", lambda: 1)
-    machine = tmp_path / "machine.toml"
-    assert hybridsep("init", machine)[0] == 0
-    status, out, err = hybridsep("backtest", log, "-m", machine, "--set", "unit=rad", *predictor(Np=60))
-    assert status == 0, err
-    assert "mdeg" in out
-    assert "rad" not in out

@@ -383,11 +383,3 @@ def test_recordings_get_a_model(name: str, limit: float) -> None:
     n = len(x) // 2
     found = identify_operation([(x_d[:n], x[:n])], T_s)
     assert physics_error(found, x_d, x) < limit
-
-
-@pytest.mark.slow
-def test_a_half_at_rest_is_refused() -> None:
-    x_d, x, T_s = half("cnc_a_axis6")
-    n = len(x) // 2
-    with pytest.raises(IdentificationError, match="does not move"):
-        identify_operation([(x_d[:n], x[:n])], T_s)
