@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from averaged_cases import averaged_model
 from compensator_cases import DRIVE_LIMITS, TS, beyond
+from predictor_cases import averaged_model
 
 from hybridsep import load_machine
 from hybridsep.base.errors import StateError

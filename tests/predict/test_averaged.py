@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from averaged_cases import FRICTION, PERIOD, averaged, averaged_model, cycles, friction, physics, run
-from predictor_cases import MODEL
+from predictor_cases import FRICTION, MODEL, PERIOD, averaged, averaged_model, cycles, friction, physics, run
 
 from hybridsep.base.errors import ParameterError
 from hybridsep.base.metrics import rms

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from averaged_cases import averaged, averaged_model, cycles, friction, physics, run
 from places import EMPS
+from predictor_cases import averaged, averaged_model, cycles, friction, physics, run
 
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.backtest import backtest

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from averaged_cases import PERIOD, TS, averaged, averaged_model, change_learned, cycles, friction, physics, run
+from predictor_cases import PERIOD, TS, averaged, averaged_model, change_learned, cycles, friction, physics, run
 from random_drives.generator import SEED, Recipe
 from random_drives.simulation import simulate
 

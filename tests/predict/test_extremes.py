@@ -94,9 +94,10 @@ def test_what_is_not_refused_is_finite(
     labels = {f"mode[{i}].{key}": key for i in range(1, n_modes + 1) for key in MODE} | {name: name for name in names}
     drawn: dict[str, Value] = {label: data.draw(extreme(name), label) for label, name in labels.items()}
     stream: Stream = CoreStream(model, Path()) if in_c else (PlantStream if model in PLANTS else LookAheadStream)(model)
+    inputs: tuple[str, ...] = ("x_d",)
     if model in PLANTS:
         # A step of 100 s takes seconds; the library's plants take longer
-        given, inputs = samples[: 10 if h < 1.0 else 2], ("x_d",)
+        given = samples[: 10 if h < 1.0 else 2]
         given, h = (given, h) if in_c else (samples[:4], min(h, 1e-3))
     else:
         given, inputs, h, fixed = samples, ("x_d_ahead", "x_meas"), float(drawn["T_s"]), fixed | {"input_hold": hold}

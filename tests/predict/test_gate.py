@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from averaged_cases import averaged_model
 from numpy.typing import NDArray
+from predictor_cases import averaged_model
 
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings

@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from averaged_cases import averaged_model, cycles, physics
-from predictor_cases import MODEL
+from predictor_cases import MODEL, averaged_model, cycles, physics
 
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array

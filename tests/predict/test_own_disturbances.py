@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from averaged_cases import TS, cycles, physics, run
 from numpy.typing import ArrayLike
-from predictor_cases import MODEL
+from predictor_cases import MODEL, TS, cycles, physics, run
 
 from benchmarks.periodic import errors
 from hybridsep.base.errors import ParameterError, SignalError, StateError

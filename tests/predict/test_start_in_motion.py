@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from averaged_cases import FRICTION, TS, averaged, cycles, friction, physics
-from predictor_cases import MODEL
+from predictor_cases import FRICTION, MODEL, TS, averaged, cycles, friction, physics
 
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from averaged_cases import FRICTION, averaged, cycles, friction, physics
+from predictor_cases import FRICTION, averaged, cycles, friction, physics
 
 from hybridsep.base.metrics import coverage
 from hybridsep.base.settings import PredictorSettings

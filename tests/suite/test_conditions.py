@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from averaged_cases import averaged_model, change_learned
 from driving import T_S, initialise, run
 from library_stream import LookAheadStream
+from predictor_cases import averaged_model, change_learned
 from staircase_data import commanded
 from stream import COMPENSATOR, OUTPUTS, PREDICTOR, STAGE_PREDICTOR, Array, Value, machine_of
 from streams import StreamMaker, on_all

@@ -1,16 +1,14 @@
 """Saved states, on every implementation: a run from one is the same to the last bit, wherever it goes on."""
 
-import json
 import math
-import subprocess
-import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 import pytest
 from built_once import BuiltFmus
 from driving import SHORT, T_S, TIGHT, initialise, set_inputs, steps
-from places import SUPPORT
 from stream import (
     CANNOT,
     COMPENSATOR,
@@ -125,6 +123,17 @@ def test_a_state_of_the_other_model_goes_on_in_a_second_instance(new_stream: Str
     assert steps(second, 155, 300) == steps(first, 155, 300)
 
 
+def go_on(name: str, folder: Path, fmus: Path) -> list[list[float]]:
+    """Return the outputs of a stream that goes on from the state in a file of this name: implementation and model."""
+    implementation, _, model = name.rpartition(" ")
+    maker = StreamMaker(implementation, model, BuiltFmus(fmus), folder)
+    stream = maker()
+    stream.restore((folder / name).read_bytes())
+    outputs = steps(stream, 250, 400)
+    maker.close()
+    return outputs
+
+
 @pytest.mark.slow
 def test_states_go_on_in_another_process(fmus: BuiltFmus, tmp_path: Path) -> None:
     """Of library and native FMUs; the others save the same."""
@@ -139,26 +148,9 @@ def test_states_go_on_in_another_process(fmus: BuiltFmus, tmp_path: Path) -> Non
                 (tmp_path / f"{implementation} {model}").write_bytes(stream.save())
                 expected[f"{implementation} {model}"] = steps(stream, 250, 400)
         maker.close()
-    script = f"""
-import json, sys
-from pathlib import Path
-sys.path.insert(0, {str(SUPPORT)!r})
-from built_once import BuiltFmus
-from driving import steps
-from streams import StreamMaker
-folder, outputs = Path({str(tmp_path)!r}), {{}}
-for name in {list(expected)}:
-    implementation, _, model = name.rpartition(" ")
-    maker = StreamMaker(implementation, model, BuiltFmus(Path({str(fmus.folder)!r})), folder)
-    stream = maker()
-    stream.restore((folder / name).read_bytes())
-    outputs[name] = steps(stream, 250, 400)
-    maker.close()
-print(json.dumps(outputs))
-"""
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == expected
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        for name, outputs in expected.items():
+            assert pool.submit(go_on, name, tmp_path, fmus.folder).result() == outputs
 
 
 @on_adapters(ALL, needs="bad states")
