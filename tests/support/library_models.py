@@ -1,6 +1,6 @@
 """The library's models from the values of an FMU's parameters: how every test that needs both puts them together."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,28 +8,20 @@ from typing import Any
 import numpy as np
 from built_once import built_once, shared_builds
 
-from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
+from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.variables import modes_from
-from hybridsep.fmi.weights import restore_weights, weights_file
+from hybridsep.fmi.weights import weights_file
 from hybridsep.machines.machine import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
-from hybridsep.online.look_ahead import LookAhead
-from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Drive, Encoder, simulate
-from hybridsep.plants.stage_drive import StageDrive
+from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
 from hybridsep.predict.regression import RidgeRegression
 
 RUNAWAY = 1e5  # pole of the recursion that diverges: e_h grows by it with each sample
-
-
-def numbered(modes: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return modes under the names of their FMU variables, ``mode[i].*``."""
-    return {f"mode[{i}].{key}": value for i, mode in enumerate(modes, start=1) for key, value in mode.items()}
 
 
 def library_predictor(values: Mapping[str, Any]) -> HybridPredictor:
@@ -41,35 +33,6 @@ def library_predictor(values: Mapping[str, Any]) -> HybridPredictor:
 def library_compensator(values: Mapping[str, Any]) -> SepCompensator:
     """Return the compensator."""
     return SepCompensator(library_predictor(values), CompensatorSettings.from_fmi(values))
-
-
-def library_plant(values: Mapping[str, Any]) -> Drive:
-    """Return the stage where there are modes among the values, the nonlinear drive otherwise."""
-    if modes := modes_from(values):
-        chosen = {name: PARAMETERS[name].from_fmi(values[name]) for name in ("friction_on", "input_hold")}
-        numbers = {name: values[name] for name in ("f", "kappa", "T_s", "v_friction")}
-        return StageDrive(ModalModel([Mode(**mode) for mode in modes], values["dead_time"]), **numbers, **chosen)
-    return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
-
-
-def library_look_ahead(values: Mapping[str, Any], weights: bytes = b"") -> LookAhead:
-    """Return the compensator's look-ahead where the values have a preview, the predictor's otherwise.
-
-    ``values``: parameters and ``x_d_ahead``, where it starts; ``weights``: content of ``weights.bin``, with which it
-    starts warm.
-    """
-    start = float(values["x_d_ahead"])
-    if "preview" not in values:
-        predictor = _learned(library_predictor(values), weights)
-        return LookAhead(predictor, start)
-    compensator = library_compensator(values)
-    _learned(compensator.predictor, weights)
-    return LookAhead(compensator, start)
-
-
-def restored_look_ahead(kind: str, blob: bytes) -> LookAhead:
-    """Return what a look-ahead's ``to_bytes`` described; ``kind``: the FMU's model."""
-    return LookAhead.from_bytes(blob, HybridPredictor if kind == "HybridPredictor" else SepCompensator)
 
 
 def learned_file(saved: Path | None) -> bytes:
@@ -106,10 +69,4 @@ def runaway_predictor() -> HybridPredictor:
     factor = np.asfortranarray(1e6 * np.eye(predictor.regression.n_features + 1))
     factor[:-1, -1] = factor[:-1, :-1] @ weights
     predictor.take_over((), predictor.state.uncertainty, (RidgeRegression(factor, 1000.0),))
-    return predictor
-
-
-def _learned(predictor: HybridPredictor, weights: bytes) -> HybridPredictor:
-    if weights:
-        restore_weights(predictor, weights)
     return predictor

@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from library_models import library_look_ahead, library_plant, numbered, restored_look_ahead
-from stream import CANNOT, LIBRARY, OUTPUTS, Array, RefusedStreamError, Value, kind_of, table_of_model
+from library_models import library_compensator, library_predictor
+from stream import CANNOT, LIBRARY, OUTPUTS, PREDICTOR, Array, RefusedStreamError, Value, kind_of, table_of_model
 
 from hybridsep import HybridSepError
 from hybridsep.base.clock import SampleClock
@@ -15,7 +15,14 @@ from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.signals import check_position
 from hybridsep.base.state import pack, unpack
 from hybridsep.compensate.compensator import SepCompensator
-from hybridsep.plants.plant import Encoder
+from hybridsep.fmi.variables import modes_from
+from hybridsep.fmi.weights import restore_weights
+from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.online.look_ahead import LookAhead
+from hybridsep.plants.feed_drive import FeedDrive
+from hybridsep.plants.plant import Drive, Encoder
+from hybridsep.plants.stage_drive import StageDrive
+from hybridsep.predict.predictor import HybridPredictor
 
 
 @contextmanager
@@ -31,7 +38,8 @@ def start_values(model: str) -> dict[str, Any]:
     """Return the start values of a model's inputs and parameters."""
     table = table_of_model(model)
     inputs = {"x_d": 0.0} if "FeedDrive" in model else {"x_d_ahead": 0.0, "x_meas": 0.0, "x_load": 0.0, "reset": False}
-    return {**inputs, **table.parameters, **numbered(table.modes)}
+    modes = {f"mode[{i}].{key}": value for i, mode in enumerate(table.modes, 1) for key, value in mode.items()}
+    return {**inputs, **table.parameters, **modes}
 
 
 class LibraryStream:
@@ -80,7 +88,10 @@ class LookAheadStream(LibraryStream):
     def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
         self._values |= values
         with refusing():
-            self._look_ahead = library_look_ahead(self._values, self._weights)
+            made = (library_predictor if self._kind == PREDICTOR else library_compensator)(self._values)
+            if self._weights:
+                restore_weights(made.predictor if isinstance(made, SepCompensator) else made, self._weights)
+            self._look_ahead = LookAhead(made, float(self._values["x_d_ahead"]))
             self._clock = SampleClock.begin(start, self._values["T_s"])
         self._latched: tuple[float, ...] = (self._values["x_d_ahead"],) * 2 + (0.0,)
         self._was_reset = False
@@ -129,7 +140,9 @@ class LookAheadStream(LibraryStream):
     def restore(self, blob: bytes) -> None:
         with refusing():
             meta, _, parts = unpack(f"stream {self.model}", blob)
-            self._look_ahead = restored_look_ahead(self._kind, parts["core"])
+            self._look_ahead = LookAhead.from_bytes(
+                parts["core"], HybridPredictor if self._kind == PREDICTOR else SepCompensator
+            )
         self._clock, self._latched = SampleClock.from_state(meta["clock"]), tuple(meta["latched"][:3])
         self._values, self._was_reset = meta["values"], meta["latched"][3]
 
@@ -140,10 +153,19 @@ class PlantStream(LibraryStream):
     def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
         self._values |= values
         with refusing():
-            self._plant = library_plant(self._values)
+            self._plant = self._made(self._values)
             self._encoder = Encoder(self._values["noise_std"], self._values["seed"])
         self._plant.reset(float(self._values["x_d"]))
         self._x_meas = self._encoder.measure(self._plant.x)
+
+    @staticmethod
+    def _made(values: Mapping[str, Any]) -> Drive:
+        """Return the stage where there are modes among the values, the nonlinear drive otherwise."""
+        if not (modes := modes_from(values)):
+            return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))
+        chosen = {name: PARAMETERS[name].from_fmi(values[name]) for name in ("friction_on", "input_hold")}
+        numbers = {name: values[name] for name in ("f", "kappa", "T_s", "v_friction")}
+        return StageDrive(ModalModel([Mode(**mode) for mode in modes], values["dead_time"]), **numbers, **chosen)
 
     def step(self, t: float, h: float) -> None:
         with refusing():
