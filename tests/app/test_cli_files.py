@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from built_once import BuiltFmus
 from command_line import Run, write_log
-from library_models import trained_state
+from library_stream import trained_state
 from log_files import write
 
 from hybridsep.app.console import written_before

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run, write_log, write_rows
-from recorders import twincat_csv
+from log_files import twincat_csv
 from staircase_data import commanded, measured
 
 from hybridsep.logs.log import read_log

@@ -16,7 +16,7 @@ import staircase_data as staircase
 from c_compiler import C_SOURCES, compiler, include_flags
 from c_core import CModel
 from c_library import Library, configured, installed
-from library_models import trained_state
+from library_stream import trained_state
 from places import ROOT
 from spoiled_weights import spoiled
 from stream import STAGE_COMPENSATOR, machine_of

@@ -9,7 +9,7 @@ import elf
 import pytest
 from c_compiler import FMI_HEADERS, run_compiler
 from fmi_library import OK, Library, library_of, steps
-from library_models import trained_state
+from library_stream import trained_state
 
 from hybridsep import build_fmu, paper_machine
 from hybridsep.fmi.compile import FLAGS

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from built_once import BuiltFmus
 from driving import T_S, closed_loop, replay, steps
-from library_models import trained_state
+from library_stream import trained_state
 from places import ROOT
 from streams import FmuStream
 

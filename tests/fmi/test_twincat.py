@@ -14,7 +14,7 @@ import pytest
 from built_once import BuiltFmus
 from c_compiler import FMI_HEADERS, run_compiler
 from command_line import Run
-from library_models import trained_state
+from library_stream import trained_state
 from places import ROOT
 
 from hybridsep.fmi.controllers import CONFIGURATION_FILE, DEFINITIONS

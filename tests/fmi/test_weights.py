@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from c_core import CModel, refusal
 from command_line import Run
-from library_models import trained_state
+from library_stream import trained_state
 from spoiled_weights import spoiled
 from stream import PREDICTOR
 

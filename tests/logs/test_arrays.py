@@ -9,9 +9,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from log_files import Columns, columns, write
+from log_files import Columns, columns, write, write_parquet
 from places import CASES
-from recorders import write_parquet
 from scipy import io, sparse
 
 from hybridsep.base.errors import LogError

@@ -9,9 +9,8 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from log_files import capture, columns
+from log_files import capture, columns, halscope_csv, trace_xml, twincat_csv
 from places import CAPTURE, RECORDINGS
-from recorders import halscope_csv, trace_xml, twincat_csv
 
 from hybridsep.base.errors import LogError
 from hybridsep.logs.columns import channels

@@ -1,5 +1,7 @@
-"""The predictor against the oracle, its operator, and causality."""
+"""The predictor against the oracle, its operator, causality; runs: windows, starts, what is kept and refused."""
 
+import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,13 +10,19 @@ import pytest
 import staircase_data as staircase
 from hypothesis import given
 from hypothesis import strategies as st
+from library_stream import library_compensator, runaway_predictor, start_values
 from predictor_cases import MODEL, replay, small_signals, trained
 from properties import examples
+from stream import COMPENSATOR
 
+from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
+from hybridsep.evaluate.backtest import backtest
 from hybridsep.model.physics import ModalModel, Mode
+from hybridsep.online.look_ahead import LookAhead
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.window import Prediction
 
 NUMERATOR, DENOMINATOR = np.array([staircase.C, staircase.K]), np.array([staircase.M, staircase.C, staircase.K])
 
@@ -131,3 +139,152 @@ def test_predicting_changes_nothing_learned() -> None:
     for predictor in (first, second):
         predictor.update(x[50:60])
     assert first.to_bytes() == second.to_bytes()
+
+
+# Runs ----------------------------------------------------------------------------------------------------------------
+
+
+PLAIN = PredictorSettings(averaging=False)
+
+
+def test_update_with_the_beginning_of_the_window() -> None:
+    # Measuring 4 of 10 samples, then predicting from there, is what a window of 4 does.
+    x_d, x = small_signals(70)
+    short, exact = trained(50), trained(50)
+    short.predict(x_d[50:60])
+    exact.predict(x_d[50:54])
+    for predictor in (short, exact):
+        predictor.update(x[50:54])
+        assert predictor.k == 54
+    assert short.to_bytes() == exact.to_bytes()
+    np.testing.assert_array_equal(short.predict(x_d[54:64]).x_h, exact.predict(x_d[54:64]).x_h)
+
+
+def test_a_window_longer_than_a_batch_is_learned_whole() -> None:
+    x_d, x = small_signals(87)
+    whole, parts = trained(50), trained(50)
+    whole.predict(x_d[50:87])
+    whole.update(x[50:87])
+    replay(parts, x_d[50:87], x[50:87])
+    np.testing.assert_allclose(whole.weights, parts.weights, rtol=1e-9, atol=1e-9)
+    assert whole.k == parts.k == 87
+    assert whole.residual.last == pytest.approx(parts.residual.last, abs=1e-16)
+
+
+def test_start_is_the_first_command_unless_given() -> None:
+    x_d, x = small_signals(40, start=0.3)
+    implicit, explicit = HybridPredictor(MODEL, PLAIN), HybridPredictor(MODEL, PLAIN, start=float(x_d[0]))
+    assert implicit.start is None
+    for predictor in (implicit, explicit):
+        predictor.predict(x_d)
+        predictor.update(x)
+        assert predictor.start == x_d[0]
+    assert implicit.to_bytes() == explicit.to_bytes()
+    # At rest elsewhere, the drive first has to travel.
+    elsewhere = HybridPredictor(MODEL, PLAIN, start=0.2).predict(np.full(100, 0.3))
+    assert elsewhere.x_pb[0] == pytest.approx(0.2, abs=1e-15)
+    # Half a period of 40 ms later it has overshot by exp(−ζ ω t), ζ ω = c / 2m.
+    assert elsewhere.x_pb[20] == pytest.approx(0.3 + 0.1 * math.exp(-staircase.C / 2 * 0.020), abs=1e-3)
+
+
+def test_a_new_run_keeps_the_weights_and_forgets_the_rest() -> None:
+    predictor = trained(57)
+    weights = predictor.weights.copy()
+    predictor.predict(np.zeros(10))
+    predictor.restart(0.5, t_init=0.013)
+    np.testing.assert_array_equal(predictor.weights, weights)
+    assert (predictor.k, predictor.start, predictor.residual.last) == (0, 0.5, 0.0)
+    with pytest.raises(SignalError, match=r"^update must follow predict"):
+        predictor.update(np.zeros(10))
+    np.testing.assert_array_equal(predictor.predict(np.full(20, 0.5)).active, np.arange(20) >= 13)
+    # At rest, with zero residuals, only the constant feature is left: w₀ through the recursion.
+    predicted = predictor.predict(np.full(1, 0.5))
+    assert predicted.e_h[0] == pytest.approx(weights[0], abs=1e-18)
+
+
+def test_the_warm_up_of_a_new_run_is_saved() -> None:
+    predictor = trained(57, t_init=0.5)
+    predictor.restart(t_init=0.013)
+    replay(predictor, *small_signals(10))
+    twin = HybridPredictor.from_bytes(predictor.to_bytes())
+    assert twin.predict(np.zeros(10)).n_warm_up == predictor.predict(np.zeros(10)).n_warm_up == 3
+
+
+def test_an_automatic_warm_up_of_a_new_run_is_that_of_the_settings() -> None:
+    predictor = trained(57, t_init=0.013)
+    predictor.restart(t_init=-1.0)
+    assert predictor.n_init == HybridPredictor(MODEL, PLAIN).n_init == 300
+    predictor.restart()
+    assert predictor.n_init == 0
+
+
+def test_the_last_accepted_residual_of_the_paper_s_model_is_what_was_measured_last() -> None:
+    predictor = trained(50)
+    x_d, x = small_signals(60)
+    predicted = predictor.predict(x_d[50:])
+    predictor.update(x[50:57])
+    assert predictor.residual.last == pytest.approx(x[56] - predicted.x_pb[6], abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("use", "message"),
+    [
+        (lambda p: p.predict([]), "x_d must have at least one sample, got none"),
+        (lambda p: p.predict([0.0, math.nan]), "x_d must be finite, got nan at sample 1"),
+        (lambda p: p.predict([[0.0]]), "x_d must be one-dimensional, got shape (1, 1)"),
+        (lambda p: p.update([]), "x must have 1 … 10 samples, as predicted, got 0"),
+        (lambda p: p.update(np.zeros(11)), "x must have 1 … 10 samples, as predicted, got 11"),
+        (lambda p: p.update([0.0, math.inf]), "x must be finite, got inf at sample 1"),
+        (lambda p: p.operator(0), "n must be ≥ 1, got 0"),
+        (lambda p: p.operator(3)([0.0]), "x_d must have 3 samples, got 1"),
+        (lambda p: p.restart(math.nan), "start must be finite, got nan at sample 0"),
+        (lambda p: p.restart(0.1, t_init=-2.0), "t_init must be -1 (automatic) or 0 … 1000000 s, got -2.0"),
+        (lambda p: p.restart(0.1, t_init=math.nan), "t_init must be finite, got nan"),
+    ],
+)
+def test_bad_calls_are_refused_and_change_nothing(use: Callable[[HybridPredictor], object], message: str) -> None:
+    predictor = trained(50)
+    predictor.predict(np.zeros(10))
+    before = predictor.to_bytes()
+    with pytest.raises((SignalError, ParameterError)) as caught:
+        use(predictor)
+    assert str(caught.value) == message
+    assert predictor.to_bytes() == before
+
+
+def test_a_predictor_says_its_settings_and_how_much_it_has_learned() -> None:
+    found = HybridPredictor(MODEL, PredictorSettings(Np=20, p=5, q=2))
+    assert repr(found) == "HybridPredictor(Np = 20, p = 5, q = 2, T_s = 0.001, averaging = True, n_learned = 0)"
+    found.predict(np.zeros(20))
+    found.update(np.full(20, 1e-6))
+    assert repr(found).endswith("n_learned = 20)")
+
+
+SAID = "x_h must stay within ±1e+100 m: the learned recursion diverges; raise lambda, lower p or reset"
+
+
+def test_a_direct_prediction_that_diverges_is_refused() -> None:
+    with pytest.raises(SignalError) as caught:
+        _ = runaway_predictor().predict(np.full(100, 1e-3)).x_h
+    assert str(caught.value) == SAID
+    with pytest.raises(SignalError, match="x_pb must stay within"):
+        _ = Prediction(np.array([np.nan]), np.zeros(1), np.zeros(1), 1).x_h
+
+
+def test_a_replay_that_diverges_is_refused() -> None:
+    x_d = np.full(250, 1e-3)
+    x_d[0] = 0.0
+    with pytest.raises(SignalError, match="x_h diverges in the window from sample 0 on; raise lambda or lower p"):
+        backtest(runaway_predictor(), x_d, np.zeros(250))
+
+
+def test_a_plan_that_diverges_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    values = {**start_values(COMPENSATOR), "averaging": False, "Np": 100, "t_init": 0.0}
+    look_ahead = LookAhead(library_compensator(values), 0.0)
+    diverging = Prediction(np.full(100, np.inf), np.zeros(100), np.zeros(100), 0)
+    monkeypatch.setattr(look_ahead.predictor, "predict", lambda *_, **__: diverging)
+    for _ in range(99):
+        look_ahead.sample(0.0, 0.0)
+    for _ in range(3):
+        with pytest.raises(SignalError, match="x_pb must stay within"):
+            look_ahead.sample(0.0, 0.0)

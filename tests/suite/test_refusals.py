@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 from driving import T_S, initialise, set_inputs, steps
-from library_models import runaway_predictor
+from library_stream import runaway_predictor
 from stream import (
     CANNOT,
     COMPENSATOR,

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from driving import closed_loop, replay, steps
-from library_models import trained_state
-from library_stream import LookAheadStream
+from library_stream import LookAheadStream, trained_state
 from predictor_cases import averaged_model, change_learned
 from stream import COMPENSATOR, LIBRARY, LOOK_AHEADS, OUTPUTS, PREDICTOR, RefusedStreamError, Value
 from streams import StreamMaker, on_adapters

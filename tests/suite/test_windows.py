@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from driving import SHORT, closed_loop, initialise, replay, run
-from library_models import library_compensator
-from library_stream import start_values
+from library_stream import library_compensator, start_values
 from numpy.typing import NDArray
 from oracle import held
 from staircase_data import TS, commanded

@@ -7,8 +7,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from library_models import learned_file
-from library_stream import LookAheadStream
+from library_stream import LookAheadStream, learned_file
 from staircase_data import commanded
 from stream import COMPENSATOR, LOOK_AHEADS, OUTPUTS, PREDICTOR, TRAJECTORY, Array, Stream, Value, kind_of, machine_of
 

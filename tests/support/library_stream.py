@@ -1,28 +1,83 @@
-"""The library's models as streams, stepped as FMUs are."""
+"""The library's models from the values of an FMU's parameters, trained, and as streams, stepped as FMUs are."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from library_models import library_compensator, library_predictor
+from built_once import built_once, shared_builds
 from stream import CANNOT, LIBRARY, OUTPUTS, PREDICTOR, Array, RefusedStreamError, Value, kind_of, table_of_model
 
 from hybridsep import HybridSepError
 from hybridsep.base.clock import SampleClock
 from hybridsep.base.errors import SignalError
-from hybridsep.base.settings import PARAMETERS
+from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
 from hybridsep.base.signals import check_position
 from hybridsep.base.state import pack, unpack
 from hybridsep.compensate.compensator import SepCompensator
+from hybridsep.cosim.loop import cosimulate
+from hybridsep.evaluate.backtest import backtest
 from hybridsep.fmi.variables import modes_from
-from hybridsep.fmi.weights import restore_weights
+from hybridsep.fmi.weights import restore_weights, weights_file
+from hybridsep.machines.machine import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Drive, Encoder
+from hybridsep.plants.plant import Drive, Encoder, simulate
 from hybridsep.plants.stage_drive import StageDrive
+from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.predict.regression import RidgeRegression
+
+
+def library_predictor(values: Mapping[str, Any]) -> HybridPredictor:
+    """Return the predictor; ``dead_time`` and ``mode[i].*`` must be among the values."""
+    model = ModalModel([Mode(**mode) for mode in modes_from(values)], values["dead_time"])
+    return HybridPredictor(model, PredictorSettings.from_fmi(values))
+
+
+def library_compensator(values: Mapping[str, Any]) -> SepCompensator:
+    """Return the compensator."""
+    return SepCompensator(library_predictor(values), CompensatorSettings.from_fmi(values))
+
+
+def learned_file(saved: Path | None) -> bytes:
+    """Return the content of ``weights.bin`` for a saved predictor; none without one."""
+    return weights_file(HybridPredictor.load(saved)) if saved else b""
+
+
+def trained_state(kind: str) -> Path:
+    """Return a file with the predictor of the default machine's FMU ``kind`` after one staircase, saved once."""
+    machine, encoder = paper_machine("spring_mass_damper"), Encoder(5e-6, 7)
+
+    def train(path: Path) -> None:
+        if kind == PREDICTOR:
+            predictor, x = machine.new_predictor(), simulate(machine.new_plant(), staircase(), machine.T_s)
+            backtest(predictor, staircase(), encoder.measure_all(x))
+        else:
+            compensator = machine.new_compensator()
+            cosimulate(compensator, machine.new_plant(), staircase()[:4000], encoder=encoder)
+            predictor = compensator.predictor
+        predictor.save(path)
+
+    return built_once(shared_builds() / f"{kind}.state", train)
+
+
+def runaway_predictor() -> HybridPredictor:
+    """Return a predictor of the default machine, without warm-up, whose learned recursion diverges.
+
+    It has a bias and one past residual, so firmly learned that a run changes nothing.
+    """
+    machine = paper_machine("spring_mass_damper")
+    predictor = machine.new_predictor(replace(machine.predictor_settings, t_init=0.0))
+    weights = np.zeros(predictor.regression.n_features)
+    weights[0], weights[2 + predictor.settings.q] = 1e-3, 1e5
+    factor = np.asfortranarray(1e6 * np.eye(predictor.regression.n_features + 1))
+    factor[:-1, -1] = factor[:-1, :-1] @ weights
+    predictor.take_over((), predictor.state.uncertainty, (RidgeRegression(factor, 1000.0),))
+    return predictor
 
 
 @contextmanager

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from built_once import BuiltFmus
 from c_core import CModel, RefusedError, write_trajectory
-from library_models import learned_file
-from library_stream import LookAheadStream, PlantStream
+from library_stream import LookAheadStream, PlantStream, learned_file
 from stream import (
     CANNOT,
     CORE,
