@@ -5,7 +5,6 @@ import os
 import signal
 import sys
 import tempfile
-import zipfile
 
 # Threads make the small factorisations of these tests slower by two orders of magnitude on a busy machine. The
 # variable must be set before NumPy is loaded.
@@ -24,6 +23,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import fmpy
 import pytest
 from built_once import SHARED_BUILDS, BuiltFmus, built_once
 from command_line import Run
@@ -101,11 +101,8 @@ def folders(fmus: BuiltFmus) -> Callable[[str], Path]:
     """Return a function that gives the folder of an unpacked FMU by name, unpacked once a session."""
 
     def unpacked(name: str) -> Path:
-        def unpack(folder: Path) -> None:
-            with zipfile.ZipFile(fmus(name)) as archive:
-                archive.extractall(folder)
-
-        return built_once(fmus.folder.parent / "unpacked" / name, unpack)
+        archive = str(fmus(name))
+        return built_once(fmus.folder.parent / "unpacked" / name, lambda folder: fmpy.extract(archive, str(folder)))
 
     return unpacked
 

@@ -121,10 +121,6 @@ def test_cosim_with_compensation(hybridsep: Run, tmp_path: Path) -> None:
     assert status == 0
     assert f"{figures['hybrid']:.2f}" in out
     assert "planned by the hybrid 9" in out
-    # Preview and knots follow a window of another length.
-    short = write_rows(tmp_path / "short.csv", commanded()[:400], commanded()[:400])
-    sizes = [word for entry in ("Np=24", "p=20", "q=3") for word in ("--set", f"compensator.{entry}")]
-    assert hybridsep("cosim", "--compensate", "physics", *sizes, "--trajectory", short)[0] == 0
 
 
 @pytest.mark.slow

@@ -1,6 +1,5 @@
 """``hybridsep system``: one file with FMUs, connections and parameters."""
 
-import zipfile
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
+from built_once import content
 
 from hybridsep import FmuInstance, load_machine, staircase
 from hybridsep.fmi.archive import build_fmu
@@ -26,11 +26,6 @@ def archive(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     machine, path = load_machine(name), tmp_path_factory.mktemp("system") / "axis.ssp"
     command = staircase(machine.T_s)[:2000]
     return build_system(machine, path, command, compensate="hybrid" if compensated else None, targets=("host",))
-
-
-def content(path: Path) -> dict[str, bytes]:
-    with zipfile.ZipFile(path) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
 
 
 def test_the_documents_keep_to_the_schemas(archive: Path) -> None:

@@ -17,7 +17,7 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from built_once import FMI3, NATIVE, PYTHON, BuiltFmus, each_kind
+from built_once import FMI3, NATIVE, PYTHON, BuiltFmus, content, each_kind
 from c_compiler import FMI_HEADERS, compiler
 from elf import symbols
 from fmpy.build import build_platform_binary
@@ -54,12 +54,6 @@ LICENCES = {
 
 def kind_of(name: str) -> str:
     return "Py" if name in PYTHON else "3" if name in FMI3 else "2"
-
-
-def content(path: Path) -> dict[str, bytes]:
-    with zipfile.ZipFile(path) as archive:
-        assert archive.testzip() is None
-        return {name: archive.read(name) for name in archive.namelist()}
 
 
 def findings_of_the_toolbox(path: Path, caplog: pytest.LogCaptureFixture) -> list[str]:
@@ -223,8 +217,7 @@ def test_the_archive_without_binaries_can_be_compiled(
         for variable, command in (("CC", "cc"), ("CXX", "c++")):
             monkeypatch.setenv(variable, f"{sys.executable} -m ziglang {command}")
     folder = tmp_path / "unpacked"
-    with zipfile.ZipFile(fmus(name)) as archive:
-        archive.extractall(folder)
+    fmpy.extract(str(fmus(name)), unzipdir=str(folder))
     shutil.rmtree(folder / "binaries")
     (tmp_path / "build").mkdir()
     strict = {"CMAKE_C_FLAGS:STRING": "-Werror -Wno-strict-prototypes"}

@@ -1,14 +1,13 @@
 """Reference run of each archive, by fmpy and by the library; what fmpy does by default."""
 
 import re
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
-from built_once import FMI3, NATIVE, PYTHON, BuiltFmus, each_kind
+from built_once import FMI3, NATIVE, PYTHON, BuiltFmus, content, each_kind
 from fmpy.util import read_csv, read_ref_opt_file
 from stream import OUTPUTS
 
@@ -21,11 +20,6 @@ from hybridsep.plants.trajectory import staircase
 MACHINE = load_machine("spring_mass_damper")
 RUN = [*NATIVE, *(name for name in (*FMI3, *PYTHON) if "_" not in name)]
 RUN.remove("SepCompensator_als25010_x")
-
-
-def content(path: Path) -> dict[str, bytes]:
-    with zipfile.ZipFile(path) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
 
 
 @pytest.mark.slow

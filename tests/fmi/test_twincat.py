@@ -5,7 +5,6 @@ declare what a source FMU needs and nothing more (tests/c/msvc).
 """
 
 import sys
-import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -27,8 +26,7 @@ MICROSOFT = [
 
 
 def unpacked(fmu: Path, folder: Path) -> Path:
-    with zipfile.ZipFile(fmu) as archive:
-        archive.extractall(folder)
+    fmpy.extract(str(fmu), unzipdir=str(folder))
     return folder / "sources"
 
 

@@ -3,6 +3,7 @@
 import hashlib
 import os
 import time
+import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,13 @@ def built_once(path: Path, build: Callable[[Path], object]) -> Path:
         finally:
             lock.rmdir()
     return path
+
+
+def content(path: Path) -> dict[str, bytes]:
+    """Return the files of an archive by name."""
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        return {name: archive.read(name) for name in archive.namelist()}
 
 
 class BuiltFmus:

@@ -42,6 +42,14 @@ STAGES = (STAGE, STAGE_PREDICTOR, STAGE_COMPENSATOR)
 """Models of the stage's X drive, which differ from the default machine's in modes and settings."""
 
 
+def _refusing(kind: type[Exception], function: Callable[..., Any], *arguments: Any, **keywords: Any) -> None:
+    """Call a function whose refusal is an error of its own."""
+    try:
+        function(*arguments, **keywords)
+    except kind as error:
+        raise RefusedStreamError(str(error)) from error
+
+
 class CoreStream:
     """The C core through ctypes, as an adapter holds it: the block of its state beside the values.
 
@@ -60,12 +68,12 @@ class CoreStream:
 
     def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
         self._take(values)
-        self._refusing(self._core.initialise, start)
+        _refusing(RefusedError, self._core.initialise, start)
         self._keep_warning()
 
     def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
         self._take(values)
-        self._refusing(self._core.start_values)
+        _refusing(RefusedError, self._core.start_values)
         return self.outputs()
 
     def set(self, name: str, value: Value) -> None:
@@ -75,7 +83,7 @@ class CoreStream:
         self._core.values[self._core.slope_place[name]] = slope
 
     def step(self, t: float, h: float) -> None:
-        self._refusing(self._core.step, t, h)
+        _refusing(RefusedError, self._core.step, t, h)
         self._keep_warning()
 
     def outputs(self) -> list[float]:
@@ -108,13 +116,6 @@ class CoreStream:
         for name, value in values.items():
             self._core[name] = float(value)
 
-    @staticmethod
-    def _refusing(function: Callable[..., Any], *arguments: Any) -> None:
-        try:
-            function(*arguments)
-        except RefusedError as error:
-            raise RefusedStreamError(str(error)) from error
-
 
 class FmuStream:
     """An FMU through fmpy."""
@@ -127,24 +128,24 @@ class FmuStream:
         self._read = self._fmu.reader(self._outputs)
 
     def initialise(self, values: Mapping[str, Value], *, start: float = 0.0, stop: float | None = None) -> None:
-        self._refusing(self._fmu.begin, values, start_time=start, stop_time=stop)
-        self._refusing(self._fmu.finish)
+        _refusing(FmuError, self._fmu.begin, values, start_time=start, stop_time=stop)
+        _refusing(FmuError, self._fmu.finish)
 
     def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
-        self._refusing(self._fmu.begin, values)
+        _refusing(FmuError, self._fmu.begin, values)
         shown: list[float] = []
-        self._refusing(lambda: shown.extend(self.outputs()))
+        _refusing(FmuError, lambda: shown.extend(self.outputs()))
         return shown
 
     def set(self, name: str, value: Value) -> None:
-        self._refusing(self._fmu.set, name, value)
+        _refusing(FmuError, self._fmu.set, name, value)
 
     def set_slope(self, name: str, slope: float) -> None:
         reference = self._fmu.variables[name].valueReference
-        self._refusing(self._fmu._call, self._fmu.slave.setRealInputDerivatives, [reference], [1], [slope])
+        _refusing(FmuError, self._fmu._call, self._fmu.slave.setRealInputDerivatives, [reference], [1], [slope])
 
     def step(self, t: float, h: float) -> None:
-        self._refusing(self._fmu.step, t, h)
+        _refusing(FmuError, self._fmu.step, t, h)
 
     def outputs(self) -> list[float]:
         return [float(value) for value in self._read()]
@@ -157,7 +158,7 @@ class FmuStream:
         return self._fmu.save()
 
     def restore(self, blob: bytes) -> None:
-        self._refusing(self._fmu.restore, blob)
+        _refusing(FmuError, self._fmu.restore, blob)
 
     def reset(self) -> None:
         self._fmu.reset()
@@ -167,13 +168,6 @@ class FmuStream:
 
     def close(self) -> None:
         self._fmu.close()
-
-    @staticmethod
-    def _refusing(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> None:
-        try:
-            function(*arguments, **keywords)
-        except FmuError as error:
-            raise RefusedStreamError(str(error)) from error
 
 
 class StreamMaker:
