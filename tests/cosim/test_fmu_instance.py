@@ -135,10 +135,6 @@ for instance in instances:
 # What is no FMU ----------------------------------------------------------------------------------------------------
 
 
-def without_binaries(name: str, content: bytes) -> bytes | None:
-    return None if name.startswith("binaries/") else content
-
-
 def of_binaries(change: Callable[[bytes], bytes]) -> Callable[[str, bytes], bytes]:
     return lambda name, content: change(content) if name.startswith("binaries/") else content
 
@@ -155,7 +151,7 @@ UNREADABLE = r"Odd\.fmu is not a readable FMU: "
     [
         (of_binaries(lambda content: b"none"), r"Odd\.fmu cannot be loaded: "),
         (
-            without_binaries,
+            lambda name, content: None if name.startswith("binaries/") else content,
             r"Odd\.fmu cannot be loaded: binaries/.*FeedDrive\S* is missing, there are binaries for none",
         ),
         (

@@ -160,7 +160,7 @@ def test_the_example_of_a_machine_file_is_valid(tmp_path: Path) -> None:
 EXAMPLES = [path.name for path in sorted((ROOT / "examples").glob("*.py")) if "__main__" in path.read_text("utf-8")]
 
 
-@pytest.mark.nightly  # by day: test_commands, test_paper, test_machine, test_newcomer
+@pytest.mark.nightly  # by day: test_commands, test_paper, test_machine, test_help
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_examples_run(example: str, tmp_path: Path) -> None:
     command = [sys.executable, "-W", "error", str(ROOT / "examples" / example)]

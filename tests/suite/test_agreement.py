@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driving import SHORT, T_S, TIGHT, Loop, closed_loop, replay
+from driving import SHORT, T_S, TIGHT, Loop, closed_loop, named, replay
 from library_stream import PlantStream
 from staircase_data import commanded
 from stream import (
@@ -47,10 +47,6 @@ def assert_agreement(new_stream: StreamMaker, n: int, values: dict[str, Value], 
         whole = name in ("batch", "n_rejected", "hybrid_active", "sep_state")
         np.testing.assert_allclose(output, expected, rtol=0, atol=0 if whole else tolerance, err_msg=name)
     return loop
-
-
-def named(values: object) -> str:
-    return ",".join(f"{key}={value:g}" for key, value in values.items()) if isinstance(values, dict) else str(values)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from driving import T_S, initialise, run
+from driving import T_S, initialise, named, run
 from library_stream import LookAheadStream
 from predictor_cases import averaged_model, change_learned
 from staircase_data import commanded
@@ -97,10 +97,6 @@ def assert_agreement(new_stream: StreamMaker, inputs: tuple[Array, Array], value
     expected = of_library(new_stream.model, inputs, values)
     shown = run(new_stream(), *inputs, values, saved_at=733)
     assert_same(shown, expected, averaging=bool(values.get("averaging")))
-
-
-def named(values: dict[str, Any]) -> str:
-    return ",".join(f"{key}={value:g}" for key, value in values.items())
 
 
 @pytest.mark.slow

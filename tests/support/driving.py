@@ -26,6 +26,11 @@ TIGHT: dict[str, Value] = {"v_max": 0.08, "a_max": 8.0, "j_max": 1000.0}
 """Limits of the trajectory itself: most of a compensator's plans are bounded by them."""
 
 
+def named(values: object) -> str:
+    """Return the name of a set of values as a test's parameter."""
+    return ",".join(f"{key}={value:g}" for key, value in values.items()) if isinstance(values, dict) else str(values)
+
+
 def position(t: float) -> float:
     """Return a smooth command, m."""
     return 0.01 * (1 - math.cos(9 * t)) + 1e-3 * math.sin(40 * t)
