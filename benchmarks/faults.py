@@ -65,7 +65,7 @@ def judged(recipe: Recipe, name: str, monitored: bool) -> tuple[float, float, fl
     axis: Axis = recipe.axis
     first = 0 if name in AT_ONCE else in_motion(x_d)
     if name in DRIVES:
-        axis = CONDITIONS[DRIVES[name]].axis(axis, x_d)
+        axis = CONDITIONS[DRIVES[name]](axis, x_d)
         first = min(first, round(CHANGE * len(x_d)))
     fault, held, end = SENSORS.get(name), 0.0, first + round(1.0 / axis.T_s) if "1 s" in name else len(x_d)
 
