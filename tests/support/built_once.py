@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import shutil
 import time
 import zipfile
 from collections.abc import Callable, Sequence
@@ -67,6 +68,8 @@ def built_once(path: Path, build: Callable[[Path], object]) -> Path:
             continue
         try:
             if not path.exists():
+                if unfinished.is_dir():  # of a build that failed: the next test says why, too
+                    shutil.rmtree(unfinished)
                 build(unfinished)
                 os.replace(unfinished, path)  # noqa: PTH105 - a folder as well as a file
         finally:
