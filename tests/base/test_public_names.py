@@ -44,8 +44,10 @@ def test_packages_import_nothing() -> None:
         assert isinstance(docstring, ast.Expr), path
 
 
-def loaded(code: str, status: int = 0) -> set[str]:
-    """Return the modules that are loaded at the end of a process."""
+def loaded(arguments: list[str], status: int = 0) -> set[str]:
+    """Return the modules that are loaded at the end of a command, or, without arguments, behind the import alone."""
+    command = f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()"
+    code = command if arguments else "import hybridsep"
     at_exit = "import atexit, json, sys; atexit.register(lambda: print('\\n' + json.dumps(sorted(sys.modules))))\n"
     done = subprocess.run([sys.executable, "-c", at_exit + code], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == status, done.stderr
@@ -54,8 +56,7 @@ def loaded(code: str, status: int = 0) -> set[str]:
 
 @pytest.mark.parametrize("arguments", [[], ["--help"], ["--version"], ["cosim", "--help"]])
 def test_help_and_import_load_nothing_slow(arguments: list[str]) -> None:
-    command = f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()"
-    modules = loaded(command if arguments else "import hybridsep")
+    modules = loaded(arguments)
     assert "hybridsep" in modules
     assert not SLOW_MODULES & modules
     assert not {"numpy", "scipy"} & modules
@@ -65,15 +66,13 @@ def test_help_and_import_load_nothing_slow(arguments: list[str]) -> None:
 def test_a_replay_loads_no_plots_and_no_fmus(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("t,x_d,x\n" + "".join(f"{k * 1e-3},{k * 1e-5},{k * 1.1e-5}\n" for k in range(200)))
-    arguments = ["backtest", str(log), "-m", "spring_mass_damper"]
-    modules = loaded(f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()")
+    modules = loaded(["backtest", str(log), "-m", "spring_mass_damper"])
     assert "hybridsep.evaluate.backtest" in modules
     assert not {"matplotlib", "control", "fmpy", "pythonfmu", "ruckig"} & modules
 
 
 def test_a_log_that_is_not_there_is_said_before_what_computes_is_imported(tmp_path: Path) -> None:
     """It took four seconds."""
-    arguments = ["fit", str(tmp_path / "none.csv")]
-    modules = loaded(f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()", 2)
+    modules = loaded(["fit", str(tmp_path / "none.csv")], 2)
     assert "hybridsep.logs.log" in modules
     assert not {"scipy", "matplotlib", "fmpy"} & modules

@@ -131,8 +131,7 @@ def test_a_step_from_another_time_changes_nothing(new_stream: StreamMaker, t: fl
     stream = new_stream()
     initialise(stream)
     steps(stream, 0, 50)
-    message = f"the communication point must be 0.05 s, where the last step ended, got {t} s"
-    assert_refused(stream, t, T_S, message)
+    assert_refused(stream, t, T_S, f"the communication point must be 0.05 s, where the last step ended, got {t} s")
     stream.step(0.0496 if t < 0.05 else 0.0504, T_S)  # rounding, of an importer that means it badly
 
 

@@ -68,8 +68,7 @@ def built_once(path: Path, build: Callable[[Path], object]) -> Path:
             continue
         try:
             if not path.exists():
-                if unfinished.is_dir():  # of a build that failed: the next test says why, too
-                    shutil.rmtree(unfinished)
+                shutil.rmtree(unfinished, ignore_errors=True)  # of a build that failed: the next test says why, too
                 build(unfinished)
                 os.replace(unfinished, path)  # noqa: PTH105 - a folder as well as a file
         finally:
