@@ -1,6 +1,6 @@
 """``hybridsep fit`` over logs of several machines, judged on their second halves beside what needs no hybrid.
 
-    python -m benchmarks.fit [--emps DATA_EMPS.mat] [--windows 100 20] [LOG ...]      (ten minutes)
+    python -m benchmarks.fit [--emps DATA_EMPS.mat] [--windows 100 20] [LOG ...]      (six minutes)
     python -m benchmarks.fit --method my_module:MyMethod
 
 RMS of the second half, which is held out, in 1e-6 of the log's unit. A first-order lag with dead time, fitted to

@@ -1,6 +1,6 @@
 """Benchmark of the whole way: a log of a drive, ``hybridsep.fit``, its compensator FMU, another program of the drive.
 
-    python -m benchmarks.from_log [--n 40] [--seed 31001]      (fifteen minutes on two cores)
+    python -m benchmarks.from_log [--n 40] [--seed 31001]      (seven minutes on two cores)
 
 Drives of two masses at up to 2.5 kHz. The log has up to 8 s of a drive's own trajectory, as its encoder shows it,
 without compensation; nothing else of the drive is known. The other program is that trajectory backwards, 2.5 s of it
