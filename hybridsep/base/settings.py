@@ -324,12 +324,12 @@ class CompensatorSettings(Settings):
     def window(self, look_ahead: int) -> int:
         """Return the samples of a window: a tenth of the preview, which is ``look_ahead`` samples if left out.
 
-        It is a multiple of ``spacing``, and at least 20, or a third of a short preview: a controller plans in half of
-        it, and 20 lags fit into it, with which what is learned serves a predictor with a longer window, too.
+        It is a multiple of ``spacing``, and at least 20, a tenth of what the drive needs or a third of a short preview,
+        whichever is least: a controller plans in half of it, and its lags serve a predictor with longer windows, too.
         """
         preview, spacing = self.preview or look_ahead, self.spacing or self._spacing(look_ahead)
         most = max(1, (preview - 4 * spacing - PLAN_END) // spacing)
-        return spacing * min(most, math.ceil(max(min(20, preview / 3), preview / 10) / spacing))
+        return spacing * min(most, math.ceil(max(min(20, look_ahead / 10, preview / 3), preview / 10) / spacing))
 
     def _spacing(self, look_ahead: int) -> int:
         """Return a hundredth of a plan, or a twentieth of a preview that is much shorter."""

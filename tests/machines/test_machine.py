@@ -18,7 +18,7 @@ GOOD = """
 name = "axis"
 title = "An axis"
 sources = ["measured"]
-T_s = 0.002
+T_s = 0.001
 
 [[physics.mode]]
 f_n = 30.0
@@ -88,9 +88,9 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
     machine = load_machine(write(tmp_path, GOOD))
     settings = machine.predictor_settings
     assert (settings.Np, settings.p, settings.q) == (50, 20, 3)
-    assert machine.fmi_parameters() == {**PredictorSettings(Np=50, p=20, T_s=0.002).to_fmi(), "dead_time": 0}
+    assert machine.fmi_parameters() == {**PredictorSettings(Np=50, p=20, T_s=0.001).to_fmi(), "dead_time": 0}
     predictor = machine.new_predictor(replace(machine.predictor_settings, p=10))
-    assert (predictor.settings.p, predictor.T_s) == (10, 0.002)
+    assert (predictor.settings.p, predictor.T_s) == (10, 0.001)
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_a_file_with_defaults(tmp_path: Path) -> None:
         ("zeta = 0.5", "zeta = 0.5\ndamping = 1", r"physics.mode\[1\].damping is not an entry"),
         ("p = 20", "p = 60", r"predictor: p must be 1 … Np = 50, got 60; lower p or raise Np"),
         ("p = 20", "p = 20\nlambda = 0", r"predictor.lambda: lambda must be 1e-40 … 1e\+12 m2, got 0"),
-        ("T_s = 0.002", "T_s = -1", r"T_s: T_s must be 1e-05 … 1 s, got -1"),
+        ("T_s = 0.001", "T_s = -1", r"T_s: T_s must be 1e-05 … 1 s, got -1"),
         ('kind = "stage"', 'kind = "robot"', r"plant.kind must not be 'robot', but feed_drive, stage, identified"),
         ('kind = "stage"\nf = 1e-5', 'kind = "feed_drive"', "feed_drive needs .physics.spring_mass_damper."),
         ('kind = "stage"', 'kind = "stage"\nkappa = -1', r"plant.kappa: kappa must be 0 … 1000000 1/m, got -1"),
@@ -144,7 +144,7 @@ COMPENSATED = GOOD + "\n[drive_limits]\nvelocity = 0.2\nacceleration = 8.0\njerk
 def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Path) -> None:
     limits = Limits(0.2, 8.0, 900.0)
     expected = CompensatorSettings(limits=limits, change_max=1e-3, preview=PREVIEW, spacing=2, horizon=PREVIEW).to_fmi()
-    expected |= {**PredictorSettings(Np=20, p=20, T_s=0.002).to_fmi(), "dead_time": 0}
+    expected |= {**PredictorSettings(Np=20, p=20, T_s=0.001).to_fmi(), "dead_time": 0}
     assert load_machine(write(tmp_path, COMPENSATED)).fmi_compensator_parameters() == expected
     entries = "Np = 30\nq = 9\nlambda = 1e-9\nt_init = 0.1\npreview = 180\nspacing = 3\njerk_weight = 0\n"
     entries += "no_reversal = false\n"
@@ -155,7 +155,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
     assert {name: found[name] for name in given} == given
     changes = replace(machine.compensator_settings, preview=90, horizon=90, change_max=None, compensate="physics")
     compensator = machine.new_compensator(changes, predictor=replace(machine.compensator_predictor, p=10))
-    settings = PredictorSettings(Np=30, p=10, q=9, lam=1e-9, T_s=0.002, t_init=0.1)
+    settings = PredictorSettings(Np=30, p=10, q=9, lam=1e-9, T_s=0.001, t_init=0.1)
     assert compensator.predictor.settings == settings
     assert compensator.settings == changes
     assert (changes.spacing, changes.no_reversal, changes.jerk_weight) == (3, False, 0.0)
@@ -195,9 +195,21 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
 def test_preview_spacing_and_window_follow_from_each_other(
     tmp_path: Path, entries: str, expected: tuple[int, ...]
 ) -> None:
-    compensator = load_machine(write(tmp_path, COMPENSATED + entries + "\n")).new_compensator()
+    assert _sizes(tmp_path, COMPENSATED + entries + "\n") == expected
+
+
+@pytest.mark.parametrize(
+    ("T_s", "expected"), [(5e-4, (200, 2, 20, 20)), (1.5e-3, (133, 1, 14, 14)), (4e-3, (100, 1, 10, 10))]
+)
+def test_a_slow_controller_has_a_shorter_preview(tmp_path: Path, T_s: float, expected: tuple[int, ...]) -> None:
+    assert _sizes(tmp_path, COMPENSATED.replace("T_s = 0.001", f"T_s = {T_s}")) == expected
+
+
+def _sizes(folder: Path, text: str) -> tuple[int, ...]:
+    """Return preview, spacing, window and lags of a machine file's compensator."""
+    compensator = load_machine(write(folder, text)).new_compensator()
     settings = compensator.predictor.settings
-    assert (compensator.preview, compensator.spacing, settings.Np, settings.p) == expected
+    return compensator.preview, compensator.spacing, settings.Np, settings.p
 
 
 @pytest.mark.parametrize(
