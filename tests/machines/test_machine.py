@@ -182,34 +182,26 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("entries", "expected"),
+    ("T_s", "entries", "expected"),
     [
-        ("", (PREVIEW, 2, 20, 20)),
-        ("preview = 300", (300, 3, 30, 20)),
-        ("preview = 60", (60, 2, 20, 20)),
-        ("preview = 8", (8, 1, 1, 1)),
-        ("Np = 50", (PREVIEW, 2, 50, 20)),
-        ("Np = 1900\nspacing = 20", (2000, 20, 1900, 20)),
+        (1e-3, "", (PREVIEW, 2, 20, 20)),
+        (5e-4, "", (PREVIEW, 2, 20, 20)),
+        (1.5e-3, "", (133, 1, 14, 14)),
+        (4e-3, "", (100, 1, 10, 10)),
+        (1e-3, "preview = 300", (300, 3, 30, 20)),
+        (1e-3, "preview = 60", (60, 2, 20, 20)),
+        (1e-3, "preview = 8", (8, 1, 1, 1)),
+        (1e-3, "Np = 50", (PREVIEW, 2, 50, 20)),
+        (1e-3, "Np = 1900\nspacing = 20", (2000, 20, 1900, 20)),
     ],
 )
 def test_preview_spacing_and_window_follow_from_each_other(
-    tmp_path: Path, entries: str, expected: tuple[int, ...]
+    tmp_path: Path, T_s: float, entries: str, expected: tuple[int, ...]
 ) -> None:
-    assert _sizes(tmp_path, COMPENSATED + entries + "\n") == expected
-
-
-@pytest.mark.parametrize(
-    ("T_s", "expected"), [(5e-4, (200, 2, 20, 20)), (1.5e-3, (133, 1, 14, 14)), (4e-3, (100, 1, 10, 10))]
-)
-def test_a_slow_controller_has_a_shorter_preview(tmp_path: Path, T_s: float, expected: tuple[int, ...]) -> None:
-    assert _sizes(tmp_path, COMPENSATED.replace("T_s = 0.001", f"T_s = {T_s}")) == expected
-
-
-def _sizes(folder: Path, text: str) -> tuple[int, ...]:
-    """Return preview, spacing, window and lags of a machine file's compensator."""
-    compensator = load_machine(write(folder, text)).new_compensator()
+    text = COMPENSATED.replace("T_s = 0.001", f"T_s = {T_s}") + entries + "\n"
+    compensator = load_machine(write(tmp_path, text)).new_compensator()
     settings = compensator.predictor.settings
-    return compensator.preview, compensator.spacing, settings.Np, settings.p
+    assert (compensator.preview, compensator.spacing, settings.Np, settings.p) == expected
 
 
 @pytest.mark.parametrize(
