@@ -33,7 +33,7 @@ from hybridsep.fmi.archive import build_here
 
 LOG, PROGRAM = 8.0, 2.5  # longest log, and longest program after it, s
 BEFORE, AFTER = 0.05, 0.2  # rests before and after the program, s
-EASED = 0.25  # at its beginning and end, s
+EASED = 0.25  # in which it comes up to the trajectory's speed, and in which it stops, s
 FASTEST = 2500.0  # largest sampling rate, Hz
 RUNS = {"off": ("off", False), "physics": ("physics", False), "cold": ("hybrid", False), "warm": ("hybrid", True)}
 """Best model allowed, and whether it begins with what was learned."""
@@ -48,7 +48,7 @@ class Result(NamedTuple):
 
 
 def other_program(x_d: Array, T_s: float) -> Array:
-    """Return another program, ``(n,)``, m, of a trajectory: time that comes up to speed and stops makes it rest."""
+    """Return a trajectory backwards, ``(n,)``, m, slowed down at both ends to begin and end at rest."""
     backwards = x_d[::-1] - x_d[-1]
     first, n_eased, n = int(np.argmax(np.abs(backwards) > 1e-6)), round(EASED / T_s), round(PROGRAM / T_s)
     at = np.linspace(0.0, 1.0, n_eased)
