@@ -79,8 +79,7 @@ def fit(
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     check_outputs((), inputs)
     lags, ahead = [] if p is None else _numbers(p), None if look_ahead is None else _seconds(look_ahead)
-    pairs = [] if cascade is None else [one.partition("=") for one in cascade.split(",")]
-    gains = {gain.strip(): value for gain, _, value in pairs} or None
+    gains = None if cascade is None else _gains(cascade)
     found = [read_log(path, **reading.arguments()) for path in logs]
     # What computes takes seconds to import: a log that cannot be read is said before
     from ..fitting.build import fit_files
@@ -119,6 +118,15 @@ def _numbers(text: str) -> list[int]:
     except ValueError:
         raise ParameterError(f"--p must be whole numbers with commas, got {text!r}") from None
     return [PARAMETERS["p"].checked(one, "--p") for one in numbers]
+
+
+def _gains(text: str) -> dict[str, float]:
+    """Return the gains of an option, ``Kp=162,Kv=0.5``; ParameterError if one has no number."""
+    pairs = [one.partition("=") for one in text.split(",")]
+    try:
+        return {gain.strip(): float(value) for gain, _, value in pairs}
+    except ValueError:
+        raise ParameterError(f"--cascade must be NAME=VALUE with commas, each a number, got {text!r}") from None
 
 
 def _seconds(text: str) -> float:

@@ -3,7 +3,7 @@
 import errno
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -322,7 +322,8 @@ def fit(
     checked_name(name)
     if unknown := set(cascade or ()) - Cascade.parameters().keys():
         raise ParameterError(f"cascade has {', '.join(Cascade.parameters())}, got {listed(sorted(unknown))}")
-    gains = None if cascade is None else Cascade(**cascade)
+    needed = {gain.name: None for gain in fields(Cascade) if gain.default is MISSING}
+    gains = None if cascade is None else Cascade(**{**needed, **cascade})  # type: ignore[arg-type]  # it checks them
     progress = progress or (lambda _message, _done: None)
     given_limits = drive_limits(known)
     names = [*PredictorSettings.KNOWN, *(one.name for one in DRIVE_LIMIT_ENTRIES.values())]
@@ -350,7 +351,10 @@ def fit(
     default = replace(with_window(PredictorSettings(T_s=T_s), window), **entries)
     default.check_replay()
     settings_to_try(default, p)  # which refuses what does not fit into the window
-    ahead = None if look_ahead is None else PARAMETERS["preview"].checked(round(look_ahead / T_s), "look_ahead / T_s")
+    ahead = None
+    if look_ahead is not None:
+        label = f"look_ahead = {look_ahead:g} s, in samples of {T_s:g} s,"
+        ahead = PARAMETERS["preview"].checked(round(look_ahead / T_s), label)
 
     def stage(message: str, begin: float, end: float) -> Callable[[float], object]:
         return lambda done: progress(message, begin + (end - begin) * done)

@@ -1,9 +1,11 @@
 """Gains of a loop: the physics model that they make, in machine files and fits, and what a log says of them."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from command_line import Run
 from quick_fits import without_larger_structures, without_other_settings
 
 import hybridsep
@@ -12,7 +14,7 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.base.settings import Cascade
 from hybridsep.base.signals import Array
 from hybridsep.identify.operation import identify_operation
-from hybridsep.machines.machine import machine_from_table
+from hybridsep.machines.machine import load_machine, machine_from_table
 from hybridsep.model.physics import ModalModel
 
 
@@ -61,6 +63,31 @@ def test_without_an_integrator_and_feed_forward_it_is_one_mode() -> None:
 def test_gains_that_cannot_be(changed: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
         hybridsep.fit(None, cascade={**gains("X"), **changed})  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+def test_gains_on_the_command_line(
+    hybridsep: Run, log: tuple[Array, Array], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without_larger_structures(monkeypatch)
+    without_other_settings(monkeypatch)
+    rows = np.column_stack(log)[:3000]
+    np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header="x_d [m],x [m]", comments="")
+
+    def fit(given: str) -> tuple[int, str, str]:
+        return hybridsep("fit", tmp_path / "x.csv", "--T_s", T_S, "--cascade", given, "--out", tmp_path / "fit", "--json")
+
+    for given, message in (
+        ("Kp=10", "inertia must be a number, got None; Kv must be a number, got None"),
+        ("Kp=10,Kv", "--cascade must be NAME=VALUE with commas, each a number, got 'Kp=10,Kv'"),
+    ):
+        status, _, err = fit(given)
+        assert status == 2
+        assert message in " ".join(err.split())
+    status, _, err = fit(",".join(f"{gain} = {value}" for gain, value in gains("X").items()))
+    assert status == 0, err
+    modes = load_machine(tmp_path / "fit" / "machine.toml").model.modes
+    assert [mode.f_n for mode in modes] == pytest.approx([25.26, 1.325], rel=1e-3)
 
 
 @pytest.mark.slow
