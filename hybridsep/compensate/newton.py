@@ -120,16 +120,21 @@ class PlanModel:
         """Whether it has learned how the drive's disturbances act."""
         return STATIC in self._solved
 
-    def outgrows(self, factor: float) -> bool:
-        """Return whether the unmodified commands, and the physics model behind them, are faster than all of the run.
+    @property
+    def is_trained(self) -> bool:
+        """Whether it has weights of earlier runs."""
+        return self._model.doubts
 
-        They are, if they exceed the fastest motion so far by ``factor``. Both count, as commands may have corners that
-        no drive follows, and a model may overshoot them.
+    def outgrows(self, factor: float) -> bool:
+        """Return whether the unmodified commands, and the physics model behind them, are faster than what is learned.
+
+        They are, if they exceed the fastest motion that was learned by ``factor``. Both count, as commands may have
+        corners that no drive follows, and a model may overshoot them.
         """
         late, n = len(self._late), len(self.of_previous_plan.e_h)
         window = self._window(self._path[late:n])
         fastest = min(np.abs(np.diff(signal)).max() for signal in (window.x_d, window.x_pb))
-        return not fastest <= factor * self._model.run.fastest
+        return not fastest <= factor * self._model.learned.fastest
 
     def predict(self, x_d: Array) -> AveragedForecast:
         """Predict the plan, and what is late before it, under commands ``x_d``, ``(n,)``, m."""

@@ -213,10 +213,10 @@ RETRY = 0.5
 each further one of a run."""
 
 _FASTER, _UNPROVEN = 1.25, 0.5
-"""Speed of the preview, relative to the fastest motion of the run so far, above which plans may change the command by
+"""Speed of the preview, relative to the fastest motion that was learned, above which plans may change the command by
 this share of ``change_max`` only. ``change_max`` is to be twice the largest error without compensation, so this is that
-error: where a model that has not been compared with such a motion asks for more, it is wrong. A log does not tell what
-the drive does under the compensator's commands, so what was learned before the run does not count."""
+error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
+may change it by all of ``change_max`` where weights of earlier runs judge it."""
 
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
@@ -258,11 +258,12 @@ class AveragedPlanning(Planning):
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         g, free = predictor.physics_operator(self.horizon)
         change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
+        of_physics_change = 1.0 if model.is_trained else change
         has_learned = predictor.k >= predictor.n_init and model.has_learned
         follows = has_learned and most is SepState.HYBRID and not self.paused
         tolerance = TOLERANCE._replace(steps=PHYSICS_STEPS) if follows else TOLERANCE
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
-        physics = self.affine_plan(g, free, path, preview, self.limits(preview, change=change), tolerance)
+        physics = self.affine_plan(g, free, path, preview, self.limits(preview, change=of_physics_change), tolerance)
         if physics is None:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         if not has_learned:

@@ -226,6 +226,11 @@ class Tracking:
             f"{_words(self.inverse, shown)}, without limits and without learning on.{self._rival_words()}",
             f"change_max is {change_max}. {binding_words(self.limits.get('hybrid', {}))}",
         ]
+        if self.change_max is not None:
+            lines[-1] += (
+                " A program whose servo error is larger than the log's needs a larger one, twice its own; motion more "
+                "than 1.25 times as fast as all that was learned has half of it at first."
+            )
         if self.change_max is not None and self.change_max < self.largest:
             left = shown.words(self.largest - self.change_max, ".4g")
             lines.append(
@@ -236,7 +241,7 @@ class Tracking:
             factor, unit = shown.position
             lines.append(
                 f"The log's commands reach {factor * self.fastest:.4g} {unit}/s, above v_max = "
-                f"{factor * self.v_max:.4g} {unit}/s: what is that fast cannot be compensated; is it the drive's?"
+                f"{factor * self.v_max:.4g} {unit}/s: where they do, it bounds what the compensator adds; is it the drive's?"
             )
         return [
             *lines,

@@ -322,8 +322,8 @@ def fit(
     checked_name(name)
     if unknown := set(cascade or ()) - Cascade.parameters().keys():
         raise ParameterError(f"cascade has {', '.join(Cascade.parameters())}, got {listed(sorted(unknown))}")
-    needed = {gain.name: None for gain in fields(Cascade) if gain.default is MISSING}
-    gains = None if cascade is None else Cascade(**{**needed, **cascade})  # type: ignore[arg-type]  # it checks them
+    required = {gain.name: None for gain in fields(Cascade) if gain.default is MISSING}
+    gains = None if cascade is None else Cascade(**{**required, **cascade})  # type: ignore[arg-type]  # it checks them
     progress = progress or (lambda _message, _done: None)
     given_limits = drive_limits(known)
     names = [*PredictorSettings.KNOWN, *(one.name for one in DRIVE_LIMIT_ENTRIES.values())]

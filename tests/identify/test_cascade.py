@@ -75,7 +75,9 @@ def test_gains_on_the_command_line(
     np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header="x_d [m],x [m]", comments="")
 
     def fit(given: str) -> tuple[int, str, str]:
-        return hybridsep("fit", tmp_path / "x.csv", "--T_s", T_S, "--cascade", given, "--out", tmp_path / "fit", "--json")
+        return hybridsep(
+            "fit", tmp_path / "x.csv", "--T_s", T_S, "--cascade", given, "--out", tmp_path / "fit", "--json"
+        )
 
     for given, message in (
         ("Kp=10", "inertia must be a number, got None; Kv must be a number, got None"),

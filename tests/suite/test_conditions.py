@@ -54,10 +54,10 @@ def cut(model: str, Np: int, delay: int, n: int = 1500) -> tuple[Array, Array]:
 
 
 @cache
-def learned(model: str, leading: Regression = ARX_RESIDUAL) -> bytes:
+def learned(model: str, leading: Regression = ARX_RESIDUAL, **sizes: int) -> bytes:
     """Return the ``weights.bin`` of the model's predictor with averaging after the staircase in which an expert led."""
     machine = machine_of(model)
-    predictor = machine.new_predictor(replace(machine.predictor_settings, averaging=True))
+    predictor = machine.new_predictor(replace(machine.predictor_settings, averaging=True, **sizes))
     backtest(predictor, *moved(model))
     stack = averaged_model(predictor).learned.stack
     change_learned(predictor, stack=replace(stack, weights=np.eye(len(EXPERTS))[leading.place]))
@@ -215,8 +215,12 @@ CHANGE_MAX = 5e-6  # m: every plan of the physics model is at it
 
 
 @on_all((COMPENSATOR,))
-def test_half_of_the_largest_change_until_the_motion_was_measured(new_stream: StreamMaker) -> None:
-    stream = new_stream()
+@pytest.mark.parametrize(("trained", "shares"), [(False, [0.5, 1.0, 0.5]), (True, [1.0, 1.0, 1.0])])
+def test_half_of_the_largest_change_until_the_motion_was_measured(
+    new_stream: StreamMaker, trained: bool, shares: list[float]
+) -> None:
+    """Of the physics model's plan where no weights judge it."""
+    stream = new_stream.planted(learned(PREDICTOR, Np=NP, p=6, q=2)) if trained else new_stream()
     initialise(stream, compensate=1, change_max=CHANGE_MAX)
     velocity = np.convolve(np.repeat([0.0, 0.02, 0.2], [20, 300, 160]), np.full(40, 1 / 40))[:480]
     x_d, x_dm = OUTPUTS[COMPENSATOR].index("x_d"), OUTPUTS[COMPENSATOR].index("x_dm")
@@ -229,4 +233,4 @@ def test_half_of_the_largest_change_until_the_motion_was_measured(new_stream: St
         changes.append(abs(outputs[x_dm] - outputs[x_d]))
     # At 20 mm/s for the first time; later; and behind what is left of the plans from before 200 mm/s came in sight
     found = [max(changes[first:last]) / CHANGE_MAX for first, last in ((0, 120), (120, 340), (380, 480))]
-    assert found == pytest.approx([0.5, 1.0, 0.5], rel=1e-3)
+    assert found == pytest.approx(shares, rel=1e-3)

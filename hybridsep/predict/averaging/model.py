@@ -64,7 +64,6 @@ class RunState:
     gate: InnovationGate
     n_rejected: int  # measurements that were missing or not plausible
     memory: Memory  # of this run and earlier ones
-    fastest: float = 0.0  # m: largest change of the physics model from sample to sample
 
     @classmethod
     def init(cls, p: int, static: StaticFeatures, command: CommandFeatures, memory: Memory) -> RunState:
@@ -334,8 +333,7 @@ class AveragedModel:
         n_rejected = run.n_rejected + m - int(accepted.sum())
         commands = np.concatenate((run.commands, window.x_d))[m:]
         memory = forecast.memory.remember(e)
-        fastest = max(run.fastest, fastest)
-        run = RunState(static, commands, (past[0], past[1]), gate, n_rejected, memory, fastest)
+        run = RunState(static, commands, (past[0], past[1]), gate, n_rejected, memory)
         return replace(state, run=run), accepted
 
 

@@ -49,14 +49,14 @@ static hsep_real averaged_planner_fastest(const hsep_averaged_planner *self, con
     return fastest;
 }
 
-/* Whether the unmodified commands, and the physics model behind them, outgrow all of the run by HSEP_PLANNING_FASTER.
+/* Whether the unmodified commands, and the physics model behind them, outgrow what is learned by HSEP_PLANNING_FASTER.
  */
 static int averaged_planner_outgrows(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     averaged_planner_command(self, task, hsep_at(self, self->rest), 0);
     const hsep_real of_command = averaged_planner_fastest(self, hsep_at(self, self->command));
     const hsep_real of_model = averaged_planner_fastest(self, hsep_at(self, self->x_pb));
-    return !(hsep_fmin(of_command, of_model) <= HSEP_PLANNING_FASTER * task->model->fastest);
+    return !(hsep_fmin(of_command, of_model) <= HSEP_PLANNING_FASTER * task->model->learned.fastest);
 }
 
 /* Predict count more samples under a plan: from the first one on, or go on behind those that are predicted; apart as
@@ -444,6 +444,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         if (self->follows) {
             averaged_planner_copy(self, hsep_at(self, self->best), rest);
             hsep_planner_follow_friction(planner);
+            planner->change = self->change;
         }
         self->gains = self->follows;
         for (self->steps = 0; self->gains && self->steps < self->n_steps; self->steps++) {
@@ -542,7 +543,8 @@ HSEP_API void hsep_averaged_planner_begin(
     for (hsep_int k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
-    task->planner->change = averaged_planner_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
+    self->change = averaged_planner_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
+    task->planner->change = hsep_averaged_doubts(task->model) ? 1.0 : self->change;
     averaged_planner_command(self, task, rest, HSEP_N_DECIDED + self->n);
     const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->samples = self->late + (pinned > 0 ? pinned : 1);

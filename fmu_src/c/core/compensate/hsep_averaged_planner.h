@@ -46,6 +46,7 @@ typedef struct {
     hsep_int pause;         /* and after the next of its plans that runs away */
     hsep_real cost;         /* m2, of the best plan so far, */
     hsep_real cost_of_rest; /* and of the remainder of the last plan */
+    hsep_real change;       /* share of change_max that bounds the averaged model's plan */
     hsep_real start;        /* m, position of rest */
     hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
     hsep_real left;         /* and that this part and all after it take at most */
@@ -66,7 +67,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 37);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 38);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {

@@ -42,9 +42,8 @@ static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], co
     learned->velocity_scale = self->forecast_scale;
     learned->largest_step = self->forecast_step;
     for (hsep_int j = self->Np; j-- > 0; before = x_pb[j]) {
-        self->fastest = hsep_fmax(self->fastest, hsep_fabs(x_pb[j] - before));
+        learned->fastest = hsep_fmax(learned->fastest, hsep_fabs(x_pb[j] - before));
     }
-    learned->fastest = hsep_fmax(learned->fastest, self->fastest);
     memcpy(
         hsep_at(self, self->largest), hsep_at(self, self->forecast_largest),
         (size_t)self->n_static * sizeof(hsep_real));

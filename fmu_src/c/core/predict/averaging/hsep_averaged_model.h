@@ -53,7 +53,6 @@ typedef struct {
     hsep_int leading;            /* expert that led when earlier runs ended, HSEP_ARX_RESIDUAL or HSEP_ARX_COMMAND */
     hsep_gate reach;
     hsep_int n_rejected; /* samples of this run that were not accepted */
-    hsep_real fastest;   /* m, largest change of the physics model from sample to sample in this run */
     /* Of the window that is predicted */
     hsep_real forecast_scale;           /* m/s, velocity scale with it, */
     hsep_real forecast_step;            /* m, and largest change of the command, */
@@ -89,7 +88,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_learned, HSEP_LEARNED_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_averaged,
-    36 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + HSEP_LEARNED_WORDS + sizeof(hsep_gate) / sizeof(hsep_real));
+    35 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + HSEP_LEARNED_WORDS + sizeof(hsep_gate) / sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_residual_parameters *parameters);
 /* Fill the block, which is 0, at rest at start, m, with nothing learned. */
