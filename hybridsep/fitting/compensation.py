@@ -241,7 +241,8 @@ class Tracking:
             factor, unit = shown.position
             lines.append(
                 f"The log's commands reach {factor * self.fastest:.4g} {unit}/s, above v_max = "
-                f"{factor * self.v_max:.4g} {unit}/s: where they do, it bounds what the compensator adds; is it the drive's?"
+                f"{factor * self.v_max:.4g} {unit}/s: where they do, it bounds what the compensator adds; is it the "
+                "drive's?"
             )
         return [
             *lines,
@@ -374,7 +375,7 @@ class Stretch:
             settings, Np = own, known.Np
             if preview != own.preview:
                 settings = replace(settings, preview=preview, spacing=None, horizon=None)
-                settings = settings.for_window(Np := settings.window(needed), needed)
+                settings = settings.for_window(Np := settings.window(needed, known.T_s), needed)
             found = self.expected(settings, Np)
             bound = limits_that_bind(found.x_d, found.x_dm, known.T_s, own)
             tried.append(Ahead(preview, rms(found.compensated), bound))
