@@ -10,6 +10,7 @@ from compensator_cases import DRIVE_LIMITS, MODEL, beyond, closed, compensator, 
 from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import RECOMMENDED, SepCompensator
+from hybridsep.model.physics import ModalModel
 from hybridsep.online.look_ahead import SepState
 from hybridsep.plants.feed_drive import FeedDrive
 from hybridsep.plants.plant import Plant
@@ -60,6 +61,15 @@ def test_trouble_never_makes_it_worse_than_physics(trouble: str) -> None:
     assert np.isfinite(hybrid.x_dm).all()
     assert beyond(hybrid.x_dm, limits) <= 1.0 + 1e-9
     assert np.max(np.abs(hybrid.x_dm - hybrid.x_d)) <= 1e-3
+
+
+@pytest.mark.slow
+def test_a_dead_time_that_is_too_long_is_learned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the command acts 12 samples before the physics model says so: 2.6 µm instead of 227 with its plans."""
+    monkeypatch.setattr("compensator_cases.MODEL", ModalModel(MODEL.modes, dead_time=12))
+    sep = compensator(averaging=True, Np=20, p=20)
+    closed(sep, n=3000)
+    assert closed(sep, 1, n=1500).tracking_rms < 5e-6
 
 
 def test_only_what_is_tunable_changes_in_a_run() -> None:

@@ -104,7 +104,7 @@ def assert_agreement(new_stream: StreamMaker, inputs: tuple[Array, Array], value
 @pytest.mark.parametrize(
     ("values", "inputs"),
     [
-        (AVERAGING | {"measurement_delay": DELAY, "dead_time": 3, "input_hold": 1}, late),
+        (AVERAGING | {"measurement_delay": DELAY, "dead_time": 9, "input_hold": 1}, late),
         (AVERAGING | {"Np": 20, "p": 6, "q": 2, "measurement_delay": 50}, cut),  # later than a window
         (AVERAGING | {"Np": 7, "p": 7, "q": 0, "measurement_delay": 7, "t_init": 0.25}, late),
         ({"p": 20, "measurement_delay": DELAY}, cut),

@@ -34,6 +34,11 @@ class CommandFeatures:
 
     dead_time: int  # ``d``: samples before the command may act, fewer than the physics model's
 
+    @classmethod
+    def of(cls, dead_time: int) -> "CommandFeatures":
+        """Return the features for a physics model's dead time, samples: half of it may be wrong."""
+        return cls(max(dead_time - max(CONSTANTS.early, dead_time // 2), 0))
+
     @property
     def p(self) -> int:
         """Lags."""

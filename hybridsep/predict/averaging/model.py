@@ -141,7 +141,7 @@ class AveragedModel:
         """
         static, command = (
             StaticFeatures(discrete, settings.q, settings.period, own),
-            CommandFeatures(max(discrete.dead_time - CONSTANTS.early, 0)),
+            CommandFeatures.of(discrete.dead_time),
         )
         evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * command.p + 2)
         learned, noise, leader = Learned.init(static.n), (0.0,) * len(REGRESSIONS), ARX_RESIDUAL.place
