@@ -157,8 +157,8 @@ class ModalModel:
         """Return the samples ahead that a compensator needs to plan, :data:`_LOOK_AHEAD_MAX` at most.
 
         A change of the command must act within its plan: three times the time in which the response to a step, dead
-        time included, first reaches 95 % of its end, or 1.5 periods of the lowest mode that adds 5 % somewhere, and
-        0.2 s, which count as 100 samples at least, and 200 at most.
+        time included, first reaches 95 % of its end, or 1.5 periods of the lowest mode that swings, ζ < 1, and adds 5 %
+        somewhere, and 0.2 s, which count as 100 samples at least, and 200 at most.
 
         Parameters
         ----------
@@ -174,9 +174,10 @@ class ModalModel:
             for mode in self.modes
         ]
         seen = min(0.05 * abs(self.dc_gain), max(peaks))
-        period = 1.0 / min(mode.f_n for mode, peak in zip(self.modes, peaks, strict=True) if peak >= seen) / T_s
+        swinging = [mode for mode, peak in zip(self.modes, peaks, strict=True) if peak >= seen and mode.zeta < 1.0]
+        periods = [math.ceil(1.5 / mode.f_n / T_s) for mode in swinging]
         least = min(max(100, round(0.2 / T_s)), 200)
-        return min(_LOOK_AHEAD_MAX, max(least, 3 * rise, math.ceil(1.5 * period)))
+        return min(_LOOK_AHEAD_MAX, max(least, 3 * rise, *periods))
 
     def state_space(self) -> tuple[Array, Array, Array]:
         """Return ``(A, b, c)`` of the modes, block diagonal, without the dead time.

@@ -231,5 +231,7 @@ def test_a_look_ahead_counts_the_modes_that_matter() -> None:
     assert ModalModel((fast,)).look_ahead(TS) == 200
     assert ModalModel((fast, trace)).look_ahead(TS) == 200
     assert ModalModel((fast, slow)).look_ahead(TS) == 750
+    omega = 2 * np.pi * 1.45
+    assert ModalModel((fast, Mode(1.45, 1.0, 0.034 * omega**2, 0.034 * omega))).look_ahead(TS) == 200  # it only creeps
     late = ModalModel((fast,), dead_time=100).look_ahead(TS)
     assert 3 * (100 + 10) < late < 3 * (100 + 30)
