@@ -54,7 +54,7 @@ def cut(model: str, Np: int, delay: int, n: int = 1500) -> tuple[Array, Array]:
 
 
 @cache
-def learned(model: str, leading: Regression = ARX_RESIDUAL, **sizes: int) -> bytes:
+def learned(model: str, leading: Regression = ARX_RESIDUAL, **sizes: Any) -> bytes:
     """Return the ``weights.bin`` of the model's predictor with averaging after the staircase in which an expert led."""
     machine = machine_of(model)
     predictor = machine.new_predictor(replace(machine.predictor_settings, averaging=True, **sizes))
