@@ -321,17 +321,15 @@ class CompensatorSettings(Settings):
         unless_given=None,
     )
 
-    def window(self, look_ahead: int, T_s: float) -> int:
+    def window(self, look_ahead: int) -> int:
         """Return the samples of a window: a tenth of the preview, which is ``look_ahead`` samples if left out.
 
-        A controller plans in half of a window: below 1 kHz, where it has longer for each sample, a window has as many
-        fewer. It is a multiple of ``spacing``, and at least 20 ms, of 10 to 20 samples, a tenth of what the drive needs
-        or a third of a short preview, whichever is least: its lags serve a predictor with longer windows, too.
+        It is a multiple of ``spacing``, and at least 20, a tenth of what the drive needs or a third of a short preview,
+        whichever is least: a controller plans in half of it, and its lags serve a predictor with longer windows, too.
         """
         preview, spacing = self.preview or look_ahead, self.spacing or self._spacing(look_ahead)
         most = max(1, (preview - 4 * spacing - PLAN_END) // spacing)
-        least = min(max(10, 0.02 / T_s), 20, look_ahead / 10, preview / 3)
-        return spacing * min(most, math.ceil(max(least, preview * min(0.1, 1e-4 / T_s)) / spacing))
+        return spacing * min(most, math.ceil(max(min(20, look_ahead / 10, preview / 3), preview / 10) / spacing))
 
     def _spacing(self, look_ahead: int) -> int:
         """Return a hundredth of a plan, or a twentieth of a preview that is much shorter."""

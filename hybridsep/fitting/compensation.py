@@ -375,7 +375,7 @@ class Stretch:
             settings, Np = own, known.Np
             if preview != own.preview:
                 settings = replace(settings, preview=preview, spacing=None, horizon=None)
-                settings = settings.for_window(Np := settings.window(needed, known.T_s), needed)
+                settings = settings.for_window(Np := settings.window(needed), needed)
             found = self.expected(settings, Np)
             bound = limits_that_bind(found.x_d, found.x_dm, known.T_s, own)
             tried.append(Ahead(preview, rms(found.compensated), bound))

@@ -371,7 +371,7 @@ def fit(
     needed = model.look_ahead(T_s, default.input_hold)
     ahead = needed if ahead is None else ahead
     # A compensator has shorter windows, and what the predictor has learned is to serve it, too
-    most = CompensatorSettings(preview=ahead).window(needed, T_s)
+    most = CompensatorSettings(preview=ahead).window(needed)
     if look_ahead is not None and p and max(p) > most:
         raise ParameterError(
             f"p must be at most {most}, the samples in a window of a compensator that looks {look_ahead:g} s ahead, "
@@ -461,7 +461,7 @@ def _machine(
     known = {key: value for key in PredictorSettings.KNOWN if (value := getattr(settings, key))}
     if limits:  # as numbers, for whoever reads the file, and at least as many samples in a window as there are lags
         given, needed = CompensatorSettings(preview=look_ahead), model.look_ahead(settings.T_s, settings.input_hold)
-        given = given.for_window(Np := given.window(needed, settings.T_s), needed)
+        given = given.for_window(Np := given.window(needed), needed)
         assert given.spacing is not None
         if settings.p > Np:
             Np = -(-settings.p // given.spacing) * given.spacing

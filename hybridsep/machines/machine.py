@@ -151,11 +151,11 @@ class Machine(Section):
     def compensator_predictor(self) -> PredictorSettings:
         """Settings of the compensator's own predictor: the predictor's where the section has none.
 
-        Its window follows from the preview, :meth:`~hybridsep.base.settings.CompensatorSettings.window`, with as many
+        Its window is a tenth of the preview, :meth:`~hybridsep.base.settings.CompensatorSettings.window`, with as many
         of the predictor's lags as fit into it.
         """
         own, predictor = self._compensator_entries(PredictorSettings), self.predictor_settings
-        Np = own.setdefault("Np", self._compensation().window(self.look_ahead, self.T_s))
+        Np = own.setdefault("Np", self._compensation().window(self.look_ahead))
         shorter = {"p": min(predictor.p, Np), "q": min(predictor.q, Np - 1)}
         return PredictorSettings(**{**self.predictor, **shorter, **own}, **self._sampling)
 

@@ -189,7 +189,6 @@ def test_a_late_measurement_of_the_predictor_is_the_compensators(tmp_path: Path)
         (1.5e-3, "", (133, 1, 14, 14)),
         (4e-3, "", (100, 1, 10, 10)),
         (1e-3, "preview = 300", (300, 3, 30, 20)),
-        (4e-3, "preview = 300", (300, 3, 12, 12)),
         (1e-3, "preview = 60", (60, 2, 20, 20)),
         (1e-3, "preview = 8", (8, 1, 1, 1)),
         (1e-3, "Np = 50", (PREVIEW, 2, 50, 20)),
