@@ -3,8 +3,8 @@
     python -m benchmarks.from_log [--n 40] [--seed 31001] [--faster 1]      (seven minutes on two cores)
 
 Drives of two masses at up to 2.5 kHz. The log has up to 8 s of a drive's own trajectory, as its encoder shows it,
-without compensation; nothing else of the drive is known. The other program is that trajectory backwards, so many times
-as fast, 2.5 s of it from where it moves, from rest to rest. RMS and largest tracking error of the true position,
+without compensation; nothing else of the drive is known. The other program is that trajectory backwards, ``--faster``
+times as fast, 2.5 s of it from where it moves, from rest to rest. RMS and largest tracking error of the true position,
 relative to no compensation: with plans of the physics model, with the hybrid, cold, and warm by what ``fit`` learned.
 """
 
@@ -48,7 +48,7 @@ class Result(NamedTuple):
 
 
 def other_program(x_d: Array, T_s: float, faster: float) -> Array:
-    """Return a trajectory backwards, ``(n,)``, m, so many times as fast, that begins and ends at rest."""
+    """Return a trajectory backwards, ``(n,)``, m, ``faster`` times as fast, that begins and ends at rest."""
     backwards = x_d[::-1] - x_d[-1]
     first, n_eased, n = int(np.argmax(np.abs(backwards) > 1e-6)), round(EASED / T_s), round(PROGRAM / T_s)
     at = np.linspace(0.0, 1.0, n_eased)

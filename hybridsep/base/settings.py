@@ -249,14 +249,13 @@ class Limits(Settings):
 class Cascade(Settings):
     """Gains of a proportional position loop around a (proportional-integral) velocity loop, with velocity feed-forward.
 
-    Of a linear axis in N and m, of a rotary one in N·m and rad; a torque constant is part of ``Kv``.
+    Of a linear axis in N and m, of a rotary one in N·m and rad; a torque constant is part of ``Kv``. ``inertia``,
+    ``Kp`` and ``Kv`` have to be given.
     """
 
-    inertia: float = real(None, 1e-9, 1e9, "1", "moving mass, kg, or inertia, kg·m²", unless_given=MISSING)
-    Kp: float = real(None, 1e-3, 1e6, "1/s", "gain of the position loop", unless_given=MISSING)
-    Kv: float = real(
-        *(None, 1e-9, 1e12, "1", "force of a velocity error, N·s/m, or torque, N·m·s/rad"), unless_given=MISSING
-    )
+    inertia: float = real(None, 1e-9, 1e9, "1", "moving mass, kg, or inertia, kg·m²")
+    Kp: float = real(None, 1e-3, 1e6, "1/s", "gain of the position loop")
+    Kv: float = real(None, 1e-9, 1e12, "1", "force of a velocity error, N·s/m, or torque, N·m·s/rad")
     Tv: float = real(0.0, 0.0, 1e3, "s", "integral time of the velocity loop; 0: it has no integrator")
     feed_forward: float = real(0.0, 0.0, 2.0, "1", "share of the commanded velocity that is fed forward")
     viscous: float = real(0.0, 0.0, 1e9, "1", "viscous friction, N·s/m or N·m·s/rad")
@@ -273,8 +272,9 @@ class CompensatorSettings(Settings):
     ``averaging`` follow the friction and may turn. ``change_max``, None for no bound, is about twice the servo error
     without compensation: hybrid plans that ask for far more pause
     (:func:`~hybridsep.compensate.planning.runs_away`); ``following_error_max`` about 1.3 times the largest one
-    (:class:`~hybridsep.online.monitor.Monitor`). With ``averaging`` a motion more than 1.25 times as fast as what
-    was learned is compensated with at most half of ``change_max``.
+    (:class:`~hybridsep.online.monitor.Monitor`). With ``averaging`` a hybrid plan of motion more than 1.25 times as
+    fast as what was learned changes the command by at most half of ``change_max``, and so does the physics model's,
+    unless weights of earlier runs judge it.
     """
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max", "horizon")

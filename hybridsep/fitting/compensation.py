@@ -228,8 +228,8 @@ class Tracking:
         ]
         if self.change_max is not None:
             lines[-1] += (
-                " A program whose servo error is larger than the log's needs a larger one, twice its own; motion more "
-                "than 1.25 times as fast as all that was learned has half of it at first."
+                " For a program whose largest servo error is above the log's, set it to twice that error; motion more "
+                "than 1.25 times as fast as all that was learned may use half of it at first."
             )
         if self.change_max is not None and self.change_max < self.largest:
             left = shown.words(self.largest - self.change_max, ".4g")

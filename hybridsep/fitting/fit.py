@@ -3,7 +3,7 @@
 import errno
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -322,8 +322,7 @@ def fit(
     checked_name(name)
     if unknown := set(cascade or ()) - Cascade.parameters().keys():
         raise ParameterError(f"cascade has {', '.join(Cascade.parameters())}, got {listed(sorted(unknown))}")
-    required = {gain.name: None for gain in fields(Cascade) if gain.default is MISSING}
-    gains = None if cascade is None else Cascade(**{**required, **cascade})  # type: ignore[arg-type]  # it checks them
+    gains = None if cascade is None else Cascade(**cascade)
     progress = progress or (lambda _message, _done: None)
     given_limits = drive_limits(known)
     names = [*PredictorSettings.KNOWN, *(one.name for one in DRIVE_LIMIT_ENTRIES.values())]

@@ -23,9 +23,9 @@ class AveragingConstants:
     # prior variance at the largest lag relative to lag 1, of the command's increments too; without it for these a CNC
     # axis that outgrows them has three times the error
     last_lag: float = 0.005
-    # samples, and at least half of it, by which the command may act before the physics model's dead time is over: one
-    # that is two samples too long, which no weight can mend, leaves 1.7 times the error of no compensation on a warm
-    # drive, instead of 0.25
+    # samples by which the command may act before the physics model's dead time is over, or half of the dead time, if
+    # that is more: where it is two samples too long, which no weight can mend, a warm drive leaves 1.7 times the error
+    # of no compensation instead of 0.25
     early: int = 2
     # bound on the least variance of the noise relative to the largest mean square of a window: a larger ``lambda``
     # would prevent any learning

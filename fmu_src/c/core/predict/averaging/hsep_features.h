@@ -103,7 +103,7 @@ HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_r
 /* Increments of the command. */
 typedef struct {
     hsep_int n;         /* samples of a prediction */
-    hsep_int dead_time; /* samples before the command may act: the physics model's without half of it */
+    hsep_int dead_time; /* samples before the command may act: at most half of the physics model's, rounded up */
     hsep_int n_before;  /* commands before a window that its features need */
     /* Offsets in words from the beginning of the struct */
     hsep_int commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
