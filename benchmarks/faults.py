@@ -16,13 +16,13 @@ from itertools import count, islice
 from pathlib import Path
 
 import numpy as np
-from two_mass.axis import Axis
 from two_mass.generator import Recipe
 from two_mass.plant import TwoMassDrive
 
-from benchmarks.two_mass_loops import CHANGE, CONDITIONS, closed_loop, compensator_fmu, settings_of
+from benchmarks.two_mass_loops import CHANGE, CONDITIONS, closed_loop, machine_of_drive, trajectory
 from hybridsep.base.metrics import largest, rms
 from hybridsep.base.signals import Array
+from hybridsep.fmi.archive import build_here
 from hybridsep.online.look_ahead import SepState
 
 MARGIN = 1.3  # ``following_error_max`` relative to the largest error without compensation, as ``fit`` writes it
@@ -61,8 +61,7 @@ def in_motion(x_d: Array) -> int:
 
 def judged(recipe: Recipe, name: str, monitored: bool) -> tuple[float, float, float, bool]:
     """Return RMS and largest error relative to no compensation, ms until a trip (inf: none), and if it was false."""
-    _, compensator, x_d = settings_of(recipe)
-    axis: Axis = recipe.axis
+    machine, x_d, axis = machine_of_drive(recipe), trajectory(recipe), recipe.axis
     first = 0 if name in AT_ONCE else in_motion(x_d)
     if name in DRIVES:
         axis = CONDITIONS[DRIVES[name]](axis, x_d)
@@ -76,11 +75,11 @@ def judged(recipe: Recipe, name: str, monitored: bool) -> tuple[float, float, fl
             return x_meas
         return fault(x_meas, held, float(x_d[k]))
 
-    assert compensator.change_max is not None
-    allowed = MARGIN * compensator.change_max / 2 if monitored else 0.0
+    sound = TwoMassDrive(recipe.axis, float(x_d[0])).run(x_d)
+    allowed = MARGIN * largest(x_d - sound) if monitored else 0.0
     with tempfile.TemporaryDirectory() as folder:
-        fmu = compensator_fmu(recipe, Path(folder))
-        loop = closed_loop(fmu, recipe, axis, "hybrid", sensor, following_error_max=allowed)
+        fmu = build_here(machine, "SepCompensator", Path(folder))
+        loop = closed_loop(fmu, machine, recipe, axis, "hybrid", sensor, following_error_max=allowed)
     off = (x_d - TwoMassDrive(axis, float(x_d[0])).run(x_d))[first:]
     error, tripped = (x_d - loop.x)[first:], np.flatnonzero(loop.state[first:] == SepState.TRIPPED)
     moved = int(np.argmax(np.abs(x_d[first:] - x_d[first]) > allowed))

@@ -13,7 +13,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from functools import partial
 from itertools import pairwise
 from multiprocessing import get_context
@@ -27,78 +27,67 @@ from two_mass.plant import TwoMassDrive
 
 from hybridsep.base.errors import HybridSepError
 from hybridsep.base.metrics import largest, peak_derivatives, rms
-from hybridsep.base.settings import PARAMETERS, CompensatorSettings, Limits, PredictorSettings
+from hybridsep.base.settings import PARAMETERS, CompensatorSettings
 from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import Sensor, cosimulate
 from hybridsep.cosim.run import Run
-from hybridsep.evaluate.backtest import backtest
+from hybridsep.fitting.compensation import taught
+from hybridsep.fitting.replay import Recording
 from hybridsep.fmi.archive import build_here
 from hybridsep.identify.model import machine_of
-from hybridsep.predict.predictor import HybridPredictor
+from hybridsep.machines.machine import Machine
 
 DURATION = 2.5  # longest run, s
-KNOTS, SETTLING = 0.002, 0.15  # time between the knots of a plan, and time of a preview beyond the window, s
 SPARE = (2.0, 3.0, 5.0)  # limits of velocity, acceleration and jerk relative to the trajectory's
 
 
-def settings_of(recipe: Recipe) -> tuple[PredictorSettings, CompensatorSettings, Array]:
-    """Return the settings of a drive's compensator, and its trajectory, ``(n,)``, m, of at most :data:`DURATION`.
+def trajectory(recipe: Recipe) -> Array:
+    """Return a drive's commanded positions, ``(n,)``, m, of at most :data:`DURATION`."""
+    return recipe.x_d[: round(DURATION / recipe.axis.T_s)]
 
-    The drive's limits leave something to the trajectory's, and the change of the command may be twice the servo error.
+
+def machine_of_drive(recipe: Recipe) -> Machine:
+    """Return a drive's physics model, and limits which leave something to those of its trajectory.
+
+    The settings are those that ``fit`` writes where it is given these limits; the change may be twice the servo error.
     """
-    T_s, Np = recipe.axis.T_s, recipe.settings.Np
-    spacing = max(1, round(KNOTS / T_s))
-    Np = spacing * max(1, round(Np / spacing))
-    x_d = recipe.x_d[: round(DURATION / T_s)]
+    T_s, hold, x_d, Np = recipe.axis.T_s, recipe.settings.input_hold, trajectory(recipe), recipe.settings.Np
     error = x_d - TwoMassDrive(recipe.axis, float(x_d[0])).run(x_d)
     velocity, acceleration, jerk = (spare * peak for spare, peak in zip(SPARE, peak_derivatives(x_d, T_s), strict=True))
-    return (
-        replace(recipe.settings, Np=Np, p=min(50, Np)),
-        CompensatorSettings(
-            preview=Np + max(Np, 4 * spacing + 3, round(SETTLING / T_s)),
-            spacing=spacing,
-            limits=Limits(velocity=velocity, acceleration=acceleration, jerk=jerk),
-            change_max=2 * largest(error),
-        ),
-        x_d,
+    window = CompensatorSettings().window(recipe.model.look_ahead(T_s, hold))
+    return machine_of(
+        *(recipe.model, hold, T_s, "two_mass", f"Drive of two masses {recipe.index}"),
+        predictor={"Np": Np, "p": min(50, Np, window)},
+        drive_limits={
+            "velocity": velocity,
+            "acceleration": acceleration,
+            "jerk": jerk,
+            "change_max": 2 * largest(error),
+        },
     )
-
-
-def compensator_fmu(recipe: Recipe, folder: Path, weights: Path | None = None) -> Path:
-    """Build the compensator of a drive's physics model, with what a saved predictor has learned."""
-    predictor, compensator, _ = settings_of(recipe)
-    assert compensator.limits is not None
-    sizes = {name: getattr(compensator, name) for name in ("preview", "spacing")}
-    machine = machine_of(
-        *(recipe.model, predictor.input_hold, predictor.T_s, "two_mass", f"Drive of two masses {recipe.index}"),
-        compensator={"Np": predictor.Np, "p": predictor.p, **sizes},
-        drive_limits={**asdict(compensator.limits), "change_max": compensator.change_max},
-    )
-    return build_here(machine, "SepCompensator", folder, weights=weights)
 
 
 def closed_loop(
     fmu: Path,
+    machine: Machine,
     recipe: Recipe,
     axis: Axis,
     compensate: str,
     sensor: Sensor = lambda _k, x: x,
     **more: float,
 ) -> Run:
-    """Return a run of a drive, which may be another one than the recipe's, behind its compensator.
+    """Return a run of a drive, which may be another one than the recipe's, behind its machine's compensator.
 
     ``compensate``: {"off", "physics", "hybrid"}; ``sensor``: returns what is measured in the place of a measurement;
     ``**more``: parameters of the FMU besides.
     """
-    predictor, compensator, x_d = settings_of(recipe)
-    assert compensator.limits is not None
-    late, noise, quantum = compensator.preview or 0, recipe.noise.tolist(), recipe.encoder.quantum
+    x_d, late = trajectory(recipe), machine.compensator_settings.preview or 0
+    noise, quantum = recipe.noise.tolist(), recipe.encoder.quantum
 
     def measured(k: int, x: float) -> float:
         return sensor(k, quantum * round((x + noise[(k + late) % len(x_d)]) / quantum))
 
-    values = {**predictor.to_fmi(), **compensator.to_fmi(), **compensator.limits.to_fmi(), **more}
-    values |= {"compensate": PARAMETERS["compensate"].to_fmi(compensate), "horizon": 0}  # plans end with the preview
+    values = {"compensate": PARAMETERS["compensate"].to_fmi(compensate), **more}
     drive = TwoMassDrive(replace(axis, change_at=axis.change_at + late))
     return cosimulate(fmu, drive, x_d, controller_values=values, sensor=measured)
 
@@ -180,18 +169,18 @@ class Result:
 def results(index: int, seed: int, only: str = "") -> list[Result]:
     """Return the results of a drive under each condition whose name has a text."""
     recipe = Recipe.draw(index, seed)
-    _, compensator, x_d = settings_of(recipe)
-    assert compensator.limits is not None
-    assert compensator.change_max is not None
-    T_s, start, late = recipe.axis.T_s, float(x_d[0]), compensator.preview or 0
-    limits = (compensator.limits.velocity, compensator.limits.acceleration, compensator.limits.jerk)
+    machine, x_d = machine_of_drive(recipe), trajectory(recipe)
+    T_s, start, late = machine.T_s, float(x_d[0]), machine.compensator_settings.preview or 0
+    limits, change_max = machine.command_limits()
+    assert limits is not None
+    assert change_max is not None
 
     def errors(x: Array) -> tuple[float, float]:
         error = (x_d - x)[: len(x_d) - late]
         return (rms(error), largest(error)) if np.isfinite(error).all() else (np.inf, np.inf)
 
     folder = tempfile.TemporaryDirectory()
-    fmus = {False: compensator_fmu(recipe, Path(folder.name))}
+    fmus = {False: build_here(machine, "SepCompensator", Path(folder.name))}
     found = []
     for name, condition in CONDITIONS.items():
         if only not in name:
@@ -199,32 +188,30 @@ def results(index: int, seed: int, only: str = "") -> list[Result]:
         axis = condition(recipe.axis, x_d)
         x = TwoMassDrive(axis, start).run(x_d)
         if name == SOUND:
-            weights = _learned(recipe, x_d, x, Path(folder.name, "learned.state"))
-            fmus[True] = compensator_fmu(recipe, Path(folder.name, "warm"), weights)
+            weights = _learned(machine, recipe, x, Path(folder.name, "learned.state"))
+            fmus[True] = build_here(machine, "SepCompensator", Path(folder.name, "warm"), weights=weights)
         physics = (np.inf, np.inf)
         for run, (compensate, warm) in RUNS.items():
             if warm and name != SOUND:
                 continue
             try:
-                loop = closed_loop(fmus[warm], recipe, axis, compensate)
+                loop = closed_loop(fmus[warm], machine, recipe, axis, compensate)
             except HybridSepError:  # it refused to go on
                 found.append(Result(name, run, index, errors(x), physics, (np.inf, np.inf), np.inf))
                 continue
-            sent = loop.x_dm
-            excess = [peak / most - 1 for peak, most in zip(peak_derivatives(sent, T_s), limits, strict=True)]
-            excess.append(largest(sent - x_d[: len(sent)]) / compensator.change_max - 1)
+            sent = loop.x_dm[: len(x_d) - late]
+            excess = [peak / most - 1 for peak, most in zip(peak_derivatives(sent, T_s), astuple(limits), strict=True)]
+            excess.append(largest(sent - x_d[: len(sent)]) / change_max - 1)
             physics = errors(loop.x) if run == "physics" else physics
             found.append(Result(name, run, index, errors(x), physics, errors(loop.x), max(excess)))
     return found
 
 
-def _learned(recipe: Recipe, x_d: Array, x: Array, path: Path) -> Path:
-    """Save what a run without compensation leaves."""
-    settings, _, _ = settings_of(recipe)
-    predictor = HybridPredictor(recipe.model, settings, start=float(x_d[0]))
-    quantum, n = recipe.encoder.quantum, len(x_d) // settings.Np * settings.Np  # whole windows
-    backtest(predictor, x_d[:n], quantum * np.round((x[:n] + recipe.noise[:n]) / quantum))
-    predictor.save(path)
+def _learned(machine: Machine, recipe: Recipe, x: Array, path: Path) -> Path:
+    """Save what ``fit`` would teach a compensator of a run without compensation, ``(n,)``, m."""
+    quantum, x_d = recipe.encoder.quantum, trajectory(recipe)
+    run = Recording(x_d, quantum * np.round((x + recipe.noise[: len(x)]) / quantum), len(x))
+    taught(machine, [run], largest(np.diff(x_d)) / machine.T_s).save(path)
     return path
 
 

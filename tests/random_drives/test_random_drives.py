@@ -16,10 +16,11 @@ from random_drives.simulation import simulate
 from two_mass import generator as two_mass
 
 from benchmarks.random_drives import Replay, replay
-from benchmarks.two_mass_loops import closed_loop, compensator_fmu, settings_of
+from benchmarks.two_mass_loops import closed_loop, machine_of_drive, trajectory
 from hybridsep.base.metrics import coverage, rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
+from hybridsep.fmi.archive import build_here
 from hybridsep.model.physics import ModalModel
 
 
@@ -67,9 +68,11 @@ def test_the_c_core_replays_as_the_library() -> None:
 def test_the_hybrid_follows_better_than_physics(tmp_path: Path) -> None:
     drawn = two_mass.Recipe.draw(1, two_mass.SEED)  # at 250 Hz
     recipe = replace(drawn, x_d=drawn.x_d[:400], noise=drawn.noise[:400])
-    x_d = settings_of(recipe)[2]
-    fmu = compensator_fmu(recipe, tmp_path)
-    physics, hybrid = (closed_loop(fmu, recipe, recipe.axis, compensate) for compensate in ("physics", "hybrid"))
+    machine, x_d = machine_of_drive(recipe), trajectory(recipe)
+    fmu = build_here(machine, "SepCompensator", tmp_path)
+    physics, hybrid = (
+        closed_loop(fmu, machine, recipe, recipe.axis, compensate) for compensate in ("physics", "hybrid")
+    )
     assert rms(x_d - hybrid.x) < 0.7 * rms(x_d - physics.x)
 
 
