@@ -67,7 +67,7 @@ def build(
     from ..fmi.compile import default_targets, expanded, library_paths
     from ..fmi.controllers import CONFIGURATION_FILE, write_configuration
     from ..fmi.spec import table_of
-    from ..fmi.weights import load_trained
+    from ..fmi.weights import saved_weights
     from ..logs.log import check_reading
     from ..machines.machine import load_machine, machine_path
     from ..plants.trajectory import read_trajectory
@@ -89,7 +89,7 @@ def build(
     extras: dict[str, dict[str, Any]] = {}  # of some models
     if weights is not None:
         model = _one_of(models, "--weights", "HybridPredictor", "SepCompensator")
-        load_trained(weights, axis, model)  # before any file is written
+        saved_weights(weights, axis, model)  # before any file is written
         extras[model] = {"weights": weights, "embed_weights": embed_weights}
     elif embed_weights:
         raise ParameterError("--embed-weights needs --weights, which are compiled into the sources")
@@ -165,7 +165,7 @@ def hal(
     """
     from ..base.files import atomic_open
     from ..fmi.controllers import COMPONENTS, axis_files, check_names, component_files
-    from ..fmi.weights import WEIGHTS_FILE, load_trained
+    from ..fmi.weights import WEIGHTS_FILE, saved_weights
     from ..machines.machine import load_machine
     from .console import check_outputs, warn_of_estimates
 
@@ -181,10 +181,10 @@ def hal(
             "--out must be a folder whose path has no blank, comma, quote, #, $, (, [ or backslash, at which loadrt "
             f"takes axes= apart, got {out.resolve()}"
         )
-    trained = None if weights is None else load_trained(weights, axes[0], model)
+    learned = saved_weights(weights, axes[0], model)
     files = {out / name: content for name, content in component_files(model).items()}
     for axis in axes:
-        files |= {out / axis.name / name: content for name, content in axis_files(axis, model, trained).items()}
+        files |= {out / axis.name / name: content for name, content in axis_files(axis, model, learned).items()}
     # of an earlier call: the axis would start with them
     stale = [path for axis in axes if (path := out / axis.name / WEIGHTS_FILE) not in files and path.is_file()]
     changed = [path for path, content in files.items() if not (path.is_file() and path.read_bytes() == content)]
@@ -219,14 +219,13 @@ def header(
     """
     from ..base.files import atomic_open_text
     from ..fmi.controllers import axis_header
-    from ..fmi.weights import load_trained
+    from ..fmi.weights import saved_weights
     from ..machines.machine import load_machine, machine_path
     from .console import check_outputs, warn_of_estimates
 
     axis = load_machine(machine)
     model = "HybridPredictor" if predictor else "SepCompensator"
-    trained = None if weights is None else load_trained(weights, axis, model)
-    text = axis_header(axis, model, trained)
+    text = axis_header(axis, model, saved_weights(weights, axis, model))
     path = Path(f"{axis.name}.h") if out is None else out
     inputs = {f"machine file {machine}": machine_path(machine), "saved predictor": weights}
     check_outputs([("--out", path, (".h",))], inputs, force=force)

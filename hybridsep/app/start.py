@@ -85,8 +85,7 @@ def init(
     from ..base.files import atomic_open_text
     from ..identify.model import machine_of
     from ..identify.structure import lag_mode
-    from ..machines.machine import machine_name
-    from ..machines.text import machine_text
+    from ..machines.machine import machine_name, machine_text
     from ..model.physics import ModalModel
     from .console import check_outputs
 

@@ -20,6 +20,7 @@ from ..machines.machine import Machine
 from .compile import ALL_TARGETS, default_targets, expanded
 from .flavours import FLAVOURS, FMI_VERSIONS
 from .spec import FmuSpec, fmu_name, fmu_names
+from .weights import saved_weights
 
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
@@ -97,12 +98,8 @@ def build_fmu(
         raise FmuError("embed_weights is for a native FMU with weights")
     path = Path(out) / f"{name}.fmu"
     with atomic_open(path) as file:
-        trained = None
-        if weights is not None:
-            from .weights import load_trained  # which loads slowly
-
-            trained = load_trained(weights, machine, model)
-        more: dict[str, Any] = {"samples": samples, "trained": trained, "windows": windows}
+        learned = saved_weights(weights, machine, model)
+        more: dict[str, Any] = {"samples": samples, "weights": learned, "windows": windows}
         spec = FmuSpec.of(machine, model, flavour=flavour, fmi=fmi, **more)
         if flavour == "native":
             files = native.files(spec, targets=targets, embed_weights=embed_weights)

@@ -20,6 +20,7 @@ from ..plants.plant import Encoder
 from ..plants.trajectory import staircase
 from ..predict.predictor import HybridPredictor
 from .spec import FmuSpec
+from .weights import restore_weights
 
 REFERENCE_FOLDER = "documentation/reference"
 
@@ -98,10 +99,8 @@ def _look_ahead_rows(spec: FmuSpec) -> Rows:
     machine, parameters, names = spec.machine, spec.table.parameters, list(spec.table.named("output"))
     settings = PredictorSettings.from_fmi(parameters)
     predictor, compensates = HybridPredictor(machine.model, settings), "x_dm" in names
-    if spec.trained is not None:
-        from .weights import restore_weights, weights_file
-
-        restore_weights(predictor, weights_file(spec.trained))
+    if spec.weights is not None:
+        restore_weights(predictor, spec.weights)
     model: Any = predictor
     if compensates:
         from ..compensate.compensator import SepCompensator

@@ -5,7 +5,7 @@ import json
 import uuid
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -19,9 +19,6 @@ from ..model.physics import ModalModel
 from ..plants.trajectory import staircase
 from .flavours import FLAVOURS, FMI_VERSIONS, check_version
 from .variables import SAMPLES_TRAJECTORY, FmuTable
-
-if TYPE_CHECKING:
-    from ..predict.predictor import HybridPredictor
 
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 
@@ -37,7 +34,7 @@ class FmuSpec:
     title: str  # description of the FMU
     stop_time: float  # s: end of the default experiment
     samples: Array | None = None  # (n,), m: trajectory 3 of a ReferenceTrajectory
-    trained: "HybridPredictor | None" = None  # with which a HybridPredictor or SepCompensator starts warm
+    weights: bytes | None = None  # weights file with which a HybridPredictor or SepCompensator starts warm
 
     @classmethod
     def of(
@@ -48,7 +45,7 @@ class FmuSpec:
         flavour: str = FLAVOURS[0],
         fmi: str = FMI_VERSIONS[0],
         samples: ArrayLike | None = None,
-        trained: "HybridPredictor | None" = None,
+        weights: bytes | None = None,
         windows: bool = True,
         rest: float = 0.0,
     ) -> "FmuSpec":
@@ -61,9 +58,9 @@ class FmuSpec:
         if played is not None:
             as_samples(played[:1], "samples", 1)
         name, built_in = fmu_name(model, machine.name, flavour, fmi), {"samples": played is not None}
-        table = table_of(machine, model, name, **built_in, warm=trained is not None, windows=windows, rest=rest)
+        table = table_of(machine, model, name, **built_in, warm=weights is not None, windows=windows, rest=rest)
         title, end = _title(machine, model), _stop_time(machine, table, played)
-        return cls(machine, table, flavour, fmi, title, end, played, trained)
+        return cls(machine, table, flavour, fmi, title, end, played, weights)
 
 
 def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:

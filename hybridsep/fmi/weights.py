@@ -118,16 +118,16 @@ def _differences(name: str, then: float, now: float) -> list[str]:
 
 
 def warm_predictor(machine: "Machine", weights: str | Path | None) -> HybridPredictor:
-    """Return a machine's predictor, with what a saved one has learned, if given; StateError as :func:`load_trained`."""
+    """Return a machine's predictor, with what a saved one has learned; StateError as :func:`saved_weights`."""
     if weights is None:
         return machine.new_predictor()
-    predictor = load_trained(weights, machine, "HybridPredictor")
+    predictor = _load_trained(weights, machine, "HybridPredictor")
     predictor.restart()
     return predictor
 
 
-def load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPredictor:
-    """Return the predictor that :meth:`HybridPredictor.save` wrote.
+def saved_weights(path: str | Path | None, machine: "Machine", kind: str) -> bytes | None:
+    """Return the file's content for the predictor that :meth:`HybridPredictor.save` wrote; None without one.
 
     It must have been trained for the machine: with its ``input_hold``, modes, and all settings on which weights depend
     (:func:`_learned_settings`), its predictor's or compensator's as ``kind`` says. Its window may be another one:
@@ -136,6 +136,10 @@ def load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPredi
     StateError if the file is not a saved predictor, one of another machine, naming all that differs, or has learned
     nothing.
     """
+    return None if path is None else weights_file(_load_trained(path, machine, kind))
+
+
+def _load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPredictor:
     path = Path(path)
     try:
         trained = HybridPredictor.load(path)

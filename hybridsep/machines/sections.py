@@ -347,8 +347,21 @@ def _own(settings: type[PredictorSettings | CompensatorSettings]) -> dict[str, P
     return {name: one for name, one in settings.parameters().items() if name not in settings.ELSEWHERE}
 
 
-PREDICTOR = _settings_entry(_own(PredictorSettings), lambda given: PredictorSettings(**given))
-"""Parameters of the hybrid predictor."""
+@dataclass(frozen=True, kw_only=True)
+class FileSection(Section):
+    """All entries of a machine file; what the section of the compensator leaves out is as the predictor's."""
 
-COMPENSATOR = _settings_entry({**_own(PredictorSettings), **_own(CompensatorSettings)}, lambda _given: None)
-"""Parameters of the compensator; the predictor's count where they are left out."""
+    name: str = name_entry()
+    title: str = line_entry()
+    sources: tuple[str, ...] = lines_entry()
+    T_s: float = parameter_entry("T_s", PARAMETERS["T_s"].default)
+    unit: str = choice_entry("m", "rad", default="m")
+    physics: Physics = section_entry(Physics)
+    predictor: Mapping[str, Any] = _settings_entry(_own(PredictorSettings), lambda given: PredictorSettings(**given))
+    compensator: Mapping[str, Any] = _settings_entry(
+        {**_own(PredictorSettings), **_own(CompensatorSettings)}, lambda _given: None
+    )
+    plant: PlantSection | None = plant_entry()
+    limits: LimitsSection | None = section_entry(LimitsSection, None)
+    drive_limits: DriveLimitsSection | None = section_entry(DriveLimitsSection, None)
+    log: LogSection = section_entry(LogSection, LogSection())
