@@ -10,7 +10,7 @@ import typer
 from ..base.errors import ParameterError
 from ..base.files import DEFAULT_MACHINE
 from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, check_version
-from .options import ForceOption, MachineOption, SetOption, TargetOption, UnitOption, WeightsOption
+from . import options
 
 if TYPE_CHECKING:
     from ..machines.machine import Machine
@@ -22,8 +22,8 @@ def build(
     fmus: Annotated[
         list[str] | None, typer.Argument(help="FMUs to build, by name; all of the machine's if left out.")
     ] = None,
-    machine: MachineOption = DEFAULT_MACHINE,
-    entries: SetOption = None,
+    machine: options.MachineOption = DEFAULT_MACHINE,
+    entries: options.SetOption = None,
     flavour: Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}.")] = FLAVOURS[0],
     fmi: Annotated[
         str,
@@ -31,13 +31,13 @@ def build(
             help=f"Version of FMI: {', '.join(FMI_VERSIONS)}; FMUs of FMI 3.0 are native, their names have Fmi3."
         ),
     ] = FMI_VERSIONS[0],
-    target: TargetOption = None,
-    weights: WeightsOption = None,
+    target: options.TargetOption = None,
+    weights: options.WeightsOption = None,
     trajectory: Annotated[
         Path | None,
         typer.Option(help="CSV, .npz or .mat file with the columns t and x_d, for ReferenceTrajectory to play."),
     ] = None,
-    unit: UnitOption = None,
+    unit: options.UnitOption = None,
     no_windows: Annotated[
         bool, typer.Option("--no-windows", help="Without a HybridPredictor's window, 4·Np scalars or four arrays.")
     ] = False,
@@ -57,7 +57,7 @@ def build(
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
-    force: ForceOption = False,
+    force: options.ForceOption = False,
 ) -> None:
     """Build FMUs from a machine file.
 
@@ -153,8 +153,8 @@ def hal(
     predictor: Annotated[
         bool, typer.Option("--predictor", help="The component that predicts alone; it needs no limits of the drive.")
     ] = False,
-    weights: WeightsOption = None,
-    force: ForceOption = False,
+    weights: options.WeightsOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Write the HAL component for LinuxCNC, and its axes.
 
@@ -209,8 +209,8 @@ def header(
     predictor: Annotated[
         bool, typer.Option("--predictor", help="Of the predictor alone; it needs no limits of the drive.")
     ] = False,
-    weights: WeightsOption = None,
-    force: ForceOption = False,
+    weights: options.WeightsOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Write an axis as a C header for the library in C.
 

@@ -10,16 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..base.errors import LogError
-from .options import (
-    ForceOption,
-    JsonOption,
-    LogArgument,
-    MachineOption,
-    ReadingOptions,
-    SavedOption,
-    SetOption,
-    takes_reading,
-)
+from . import options
 
 if TYPE_CHECKING:
     from ..logs.checks import Finding
@@ -27,14 +18,14 @@ if TYPE_CHECKING:
     from ..machines.machine import Machine
 
 
-@takes_reading
+@options.takes_reading
 def backtest(
-    log: LogArgument,
-    machine: MachineOption,
-    entries: SetOption = None,
-    weights: SavedOption = None,
+    log: options.LogArgument,
+    machine: options.MachineOption,
+    entries: options.SetOption = None,
+    weights: options.SavedOption = None,
     *,
-    reading: ReadingOptions,
+    reading: options.ReadingOptions,
     report: Annotated[Path | None, typer.Option(help="HTML file about the replay, which needs no network.")] = None,
     figure: Annotated[
         Path | None, typer.Option(help="PNG, PDF or SVG with the errors of the predictions over time.")
@@ -46,8 +37,8 @@ def backtest(
             "predictions sample by sample (.csv, .npz); may be given for each."
         ),
     ] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.ForceOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Check a recorded log and replay it causally.
 
@@ -114,7 +105,7 @@ def backtest(
     print_written(report, figure, *saved)
 
 
-def read_checked(path: Path, reading: ReadingOptions, machine: Machine) -> tuple[Log, tuple[Finding, ...]]:
+def read_checked(path: Path, reading: options.ReadingOptions, machine: Machine) -> tuple[Log, tuple[Finding, ...]]:
     """Read a log of a machine and check it; what was found is shown.
 
     LogError if the log cannot be read, its columns mean something else, or a measurement misses without averaging;

@@ -12,7 +12,7 @@ what is measured over the fill. ``t_init`` counts from the end of the fill.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
@@ -21,9 +21,11 @@ import numpy as np
 from ..base.errors import SignalError
 from ..base.settings import samples_before
 from ..base.signals import Array, check_position
-from ..base.state import arrays_of, pack, restored, restoring, unpack
+from ..base.state import FIXED, arrays_of, pack, restored, restoring, unpack
 from ..predict.predictor import HybridPredictor
-from .monitor import Monitor
+
+_N_OVER = 3
+"""Samples in a row above the limit that trip: one or two may be outliers of the sensor. Missing ones do not count."""
 
 
 class SepState(IntEnum):
@@ -60,8 +62,47 @@ class PublishedWindow:
         return cls(rest, rest, rest, rest, np.zeros(Np), 0, Np)
 
 
-class WindowPlanner(Protocol):
-    """Interface of what a look-ahead asks for its windows."""
+@dataclass
+class Monitor:
+    """Monitor of the following error, as drives have one, and of measurements that are missing: their counts."""
+
+    n_lost: int = field(default=0, metadata=FIXED)  # samples without a measurement after which it is lost; 0: never
+    error_max: float = field(default=0.0, metadata=FIXED)  # largest following error, m; 0: none
+    n_missing: int = 0  # measurements that were missing one after another
+    n_over: int = 0  # samples above ``error_max`` one after another, three from when it tripped on
+    n_taken: int = 0  # samples taken in since the window began
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether no measurement came for so long that the change of the command fades, until one comes."""
+        return 0 < self.n_lost <= self.n_missing
+
+    @property
+    def is_tripped(self) -> bool:
+        """Whether the change of the command fades until a reset."""
+        return self.n_over >= _N_OVER
+
+    def take_in(self, error: float) -> bool:
+        """Take in a sample's following error, measured position minus command as it came, m; NaN where missing.
+
+        Returns whether it is within the limit, and nothing has tripped: what is not is not learned.
+        """
+        self.n_taken += 1
+        if math.isnan(error):
+            self.n_missing += 1
+            return True
+        self.n_missing = 0
+        if not self.is_tripped:
+            self.n_over = self.n_over + 1 if abs(error) > self.error_max > 0.0 else 0
+        return self.n_over == 0
+
+    def reset(self) -> None:
+        """End a trip; what was learned before it is kept."""
+        self.n_over = 0
+
+
+class Planner(Protocol):
+    """Interface of a planner, which modifies the commands of a window before they are predicted; it can be saved."""
 
     predictor: HybridPredictor
     preview: int  # samples of a plan, at least ``Np``
@@ -75,10 +116,6 @@ class WindowPlanner(Protocol):
 
     def update(self, x: Array) -> None:
         """Learn from the positions measured over the planned window, ``(Np,)``, m."""
-
-
-class Planner(WindowPlanner, Protocol):
-    """Interface of a planner, which modifies the commands of a window before they are predicted; it can be saved."""
 
     def to_bytes(self) -> bytes:
         """Return parameters and state, the predictor's included."""
@@ -143,7 +180,7 @@ class LookAhead:
     Np, delay : int
         Samples in a window; samples by which commands are delayed.
     model : HybridPredictor or Planner
-    planner : WindowPlanner
+    planner : Planner
         The model, or the predictor as the planner that changes nothing.
     window : PublishedWindow
         The window that ``k`` is part of.
@@ -191,9 +228,8 @@ class LookAhead:
 
     def _hold(self, model: HybridPredictor | Planner, k: int) -> None:
         self.model = model
-        self.planner: WindowPlanner = (
-            _Unmodified(model, at_rest=k < model.Np) if isinstance(model, HybridPredictor) else model
-        )
+        is_predictor = isinstance(model, HybridPredictor)
+        self.planner = _Unmodified(model, at_rest=k < model.Np) if is_predictor else model
         self.predictor = self.planner.predictor
         self.Np, self.delay = self.predictor.Np, self.planner.preview
 
