@@ -228,8 +228,9 @@ class LookAhead:
 
     def _hold(self, model: HybridPredictor | Planner, k: int) -> None:
         self.model = model
-        is_predictor = isinstance(model, HybridPredictor)
-        self.planner = _Unmodified(model, at_rest=k < model.Np) if is_predictor else model
+        self.planner: Planner | _Unmodified = (
+            _Unmodified(model, at_rest=k < model.Np) if isinstance(model, HybridPredictor) else model
+        )
         self.predictor = self.planner.predictor
         self.Np, self.delay = self.predictor.Np, self.planner.preview
 
