@@ -162,7 +162,6 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             raise
 
     def _load(self, archive: Path, folder: Path, instance_name: str) -> None:
-        """Unpack the archive, load its library and make the instance."""
         identifier, version = self.description.coSimulation.modelIdentifier, self._version
         place = f"binaries/{version.platform}/{identifier}{fmpy.sharedLibraryExtension}"
         try:
@@ -178,11 +177,9 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
                     modelIdentifier=identifier,
                     instanceName=instance_name,
                 )
-        except OSError as error:
-            if error.filename is not None:  # the disk's, with a name
-                raise
-            raise FmuError(f"{self.path.name} cannot be loaded: {first_line(error)}") from error
         except Exception as error:  # fmpy raises bare Exceptions here
+            if isinstance(error, OSError) and error.filename is not None:  # the disk's, with a name
+                raise
             raise FmuError(f"{self.path.name} cannot be loaded: {first_line(error)}") from error
         try:
             _instantiate(slave, version, self.log)
@@ -194,13 +191,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
 
     @property
     def slave(self) -> Any:
-        """The instance as fmpy's slave, for FMI calls that have no method here.
-
-        Raises
-        ------
-        FmuError
-            If the instance is closed.
-        """
+        """The instance as fmpy's slave, for FMI calls that have no method here; FmuError if it is closed."""
         if self._release is None or not self._release.alive:
             raise FmuError(f"{self.path.name}: the instance is closed; make a new FmuInstance")
         return self._slave
@@ -216,10 +207,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def initialise(self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0) -> None:
         """Set parameters and start values and run through the initialization.
 
-        Raises
-        ------
-        FmuError
-            If the FMU refuses; its own message is part of the error.
+        FmuError if the FMU refuses; its own message is part of the error.
         """
         self.begin(values, start_time=start_time)
         self.finish()

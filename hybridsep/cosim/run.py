@@ -162,12 +162,9 @@ class Run:
     def tracking_figures(self) -> dict[str, float | int]:
         """Return tracking errors, change of the command and shares of the models over the whole trajectory.
 
-        Returns
-        -------
-        dict
-            RMS and largest magnitude in µm of the tracking error, against the true position and (``_measured_``) the
-            measured one, and of the command's change; the largest velocity, acceleration and jerk of ``x_dm``, of its
-            differences; the share of the samples that each model planned, 0 … 1.
+        These are RMS and largest magnitude in µm of the tracking error, against the true position and (``_measured_``)
+        the measured one, and of the command's change; the largest velocity, acceleration and jerk of ``x_dm``, of its
+        differences; the share of the samples that each model planned, 0 … 1.
         """
         figures: dict[str, float | int] = {}
         for name, signal in (
@@ -192,10 +189,7 @@ class Run:
     def save(self, path: str | Path) -> None:
         """Write the columns of the run's kind to ``path``: ``.csv`` with one row a sample, or ``.npz``.
 
-        Raises
-        ------
-        ValueError
-            If the suffix is another one.
+        ValueError if the suffix is another one.
         """
         save_columns({name: getattr(self, name) for name in self.kind.columns}, path)
 

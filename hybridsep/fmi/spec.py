@@ -70,10 +70,7 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSI
     ``ReferenceTrajectory`` plays the paper's trajectories for every machine; it comes with the default one. Of the
     Python flavour are predictors and drives.
 
-    Raises
-    ------
-    FmuError
-        If the flavour is unknown, or has no FMUs of this version of FMI.
+    FmuError if the flavour is unknown, or has no FMUs of this version of FMI.
     """
     models = ["HybridPredictor"]
     if machine.drive_limits is not None and flavour == "native":

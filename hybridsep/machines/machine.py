@@ -18,7 +18,6 @@ from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, Cascade, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..model.physics import ModalModel, Mode
 from ..plants.feed_drive import FeedDrive
-from ..plants.plant import Drive
 from ..plants.stage_drive import StageDrive
 from .sections import NAME_PATTERN, FeedDriveSection, FileSection, IdentifiedSection, StageSection, read_section
 
@@ -138,10 +137,7 @@ class Machine(FileSection):
     ) -> "Machine":
         """Return a copy with other entries of a section, by their names in the file; ``""``: of the file itself.
 
-        Raises
-        ------
-        ParameterError
-            If they are out of range or inconsistent.
+        ParameterError if they are out of range or inconsistent.
         """
         if section:
             values = {section: {**self.table.get(section, {}), **values}}
@@ -167,13 +163,10 @@ class Machine(FileSection):
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
         return SepCompensator(own, self._compensation() if settings is None else settings)
 
-    def new_plant(self, **changes: float | str) -> Drive:
+    def new_plant(self, **changes: float | str) -> FeedDrive | StageDrive:
         """Return the plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.
 
-        Raises
-        ------
-        MachineError
-            If the file has no ``[plant]``, as for a recorded axis.
+        MachineError if the file has no ``[plant]``, as for a recorded axis.
         """
         self.check_section("plant")
         assert self.plant is not None

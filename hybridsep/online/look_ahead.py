@@ -128,9 +128,7 @@ class Planner(Protocol):
 class _Unmodified:
     """Planner that sends the commands as they are, with a predictor's prediction of them.
 
-    The lead-in is one window, at rest, which is neither predicted nor learned.
-
-    ``at_rest``: whether the current window is the lead-in.
+    The lead-in is one window, at rest, which is neither predicted nor learned; ``at_rest`` says whether it is now.
     """
 
     def __init__(self, predictor: HybridPredictor, *, at_rest: bool) -> None:
@@ -138,19 +136,16 @@ class _Unmodified:
         self._at_rest = at_rest
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
-        """Begin another run behind the lead-in, at rest at ``start``, m; the warm-up ``t_init``, s, begins there."""
         self.predictor.restart(start, t_init=t_init)
         self._at_rest = lead_in > 0
 
     def plan(self, x_d: Array, load: Array) -> PublishedWindow:
-        """Predict the next window under the load, but for the lead-in; SignalError if the prediction diverges."""
         if self._at_rest:
             return PublishedWindow.at_rest(float(x_d[0]), self.preview)
         found = self.predictor.predict(x_d + load)
         return PublishedWindow(x_d, x_d, found.x_pb, found.x_h, found.x_h_std, 0, found.n_warm_up)
 
     def update(self, x: Array) -> None:
-        """Learn from the positions measured over a predicted window, ``(Np,)``, m."""
         if not self._at_rest:
             self.predictor.update(x)
         self._at_rest = False
@@ -324,21 +319,13 @@ class LookAhead:
     def sample(self, x_d_ahead: float, x_meas: float, x_load: float = 0.0) -> None:
         """Process sample ``k`` and advance to ``k + 1``.
 
-        Parameters
-        ----------
-        x_d_ahead : float, m
-            ``r(k)``, the command for ``delay`` samples later.
-        x_meas : float, m
-            ``x(k)``, the position measured now; with a ``measurement_delay`` of −1 ``x(k + 1)``.
-        x_load : float, m
-            Load for ``delay`` samples later, as :meth:`SepCompensator.plan
-            <hybridsep.compensate.compensator.SepCompensator.plan>` takes it; it counts from that of the first sample.
+        ``x_d_ahead``, m: ``r(k)``, the command for ``delay`` samples later; ``x_meas``, m: ``x(k)``, the position
+        measured now, with a ``measurement_delay`` of −1 ``x(k + 1)``; ``x_load``, m: load for ``delay`` samples later,
+        as :meth:`SepCompensator.plan <hybridsep.compensate.compensator.SepCompensator.plan>` takes it, which counts
+        from that of the first sample.
 
-        Raises
-        ------
-        SignalError
-            If one of them is not finite; nothing is changed then. If the window that begins diverges,
-            every later sample is refused, too.
+        SignalError if one of them is not finite; nothing is changed then. If the window that begins diverges, every
+        later sample is refused, too.
         """
         self.check(x_d_ahead, x_meas, x_load)
         if self.predictor.settings.measurement_delay < 0:
@@ -374,18 +361,9 @@ class LookAhead:
 
     @classmethod
     def from_bytes(cls, blob: bytes, model_type: type[HybridPredictor] | type[Planner]) -> "LookAhead":
-        """Return the look-ahead of :meth:`to_bytes`.
+        """Return the look-ahead of :meth:`to_bytes`, whose predictor or planner is of the type ``model_type``.
 
-        Parameters
-        ----------
-        blob : bytes
-        model_type : type
-            Type of the predictor or planner.
-
-        Raises
-        ------
-        StateError
-            If the blob is foreign, truncated or of another version.
+        StateError if the blob is foreign, truncated or of another version.
         """
         meta, arrays, parts = unpack(_KIND, blob)
         look_ahead = cls.__new__(cls)

@@ -41,20 +41,6 @@ class Plant(Protocol):
         """True position, m."""
 
 
-class Drive(Plant, Protocol):
-    """Interface of the library's drives: a plant with a velocity, whose state can be saved."""
-
-    @property
-    def v(self) -> float:
-        """True velocity, m/s."""
-
-    def state(self) -> list[float]:
-        """Return the state as plain numbers."""
-
-    def restore(self, state: list[float]) -> None:
-        """Restore a :meth:`state`."""
-
-
 def simulate(plant: Plant, x_d: ArrayLike, T_s: float, *, start: float | None = None) -> Array:
     """Return the response of a plant to a command under a zero-order hold.
 
