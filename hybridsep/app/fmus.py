@@ -9,7 +9,7 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.files import DEFAULT_MACHINE
-from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, check_version
+from ..fmi import FLAVOURS, FMI_VERSIONS
 from . import options
 
 if TYPE_CHECKING:
@@ -122,7 +122,6 @@ def _models(axis: "Machine", fmus: Sequence[str], flavour: str, targets: Sequenc
     from ..fmi.compile import check_available
     from ..fmi.spec import fmu_names
 
-    check_version(flavour, fmi)
     models = fmu_names(axis, flavour, fmi)
     if unknown := sorted(set(fmus) - set(models)):
         hint = ""

@@ -141,6 +141,5 @@ def cosimulate(
 
 
 def _refuse(given: object, message: str) -> None:
-    """Raise ParameterError if an argument is given that does not apply."""
     if given is not None:
         raise ParameterError(message)

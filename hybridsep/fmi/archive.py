@@ -9,16 +9,14 @@ import shlex
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError
 from ..base.files import atomic_open
-from ..fmi import native, python
 from ..machines.machine import Machine
+from . import FLAVOURS, FMI_VERSIONS, native, python
 from .compile import ALL_TARGETS, default_targets, expanded
-from .flavours import FLAVOURS, FMI_VERSIONS
 from .spec import FmuSpec, fmu_name, fmu_names
 from .weights import saved_weights
 
@@ -99,8 +97,7 @@ def build_fmu(
     path = Path(out) / f"{name}.fmu"
     with atomic_open(path) as file:
         learned = saved_weights(weights, machine, model)
-        more: dict[str, Any] = {"samples": samples, "weights": learned, "windows": windows}
-        spec = FmuSpec.of(machine, model, flavour=flavour, fmi=fmi, **more)
+        spec = FmuSpec.of(machine, model, flavour=flavour, fmi=fmi, samples=samples, weights=learned, windows=windows)
         if flavour == "native":
             files = native.files(spec, targets=targets, embed_weights=embed_weights)
         else:

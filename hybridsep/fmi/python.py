@@ -15,8 +15,7 @@ import pythonfmu
 
 from ..base.files import data_folder
 from ..base.version import __version__
-from .description import model_description
-from .pages import documentation, filled, icon
+from .description import documentation, filled, icon, model_description
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
 from .weights import WEIGHTS_FILE

@@ -17,7 +17,7 @@ from ..machines.machine import PAPER_SETTINGS, Machine
 from ..machines.sections import FeedDriveSection, IdentifiedSection
 from ..model.physics import ModalModel
 from ..plants.trajectory import staircase
-from .flavours import FLAVOURS, FMI_VERSIONS, check_version
+from . import FLAVOURS, FMI_VERSIONS
 from .variables import SAMPLES_TRAJECTORY, FmuTable
 
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
@@ -86,7 +86,10 @@ def fmu_name(model: str, machine: str, flavour: str = FLAVOURS[0], fmi: str = FM
     """Return the archive stem of a model of the machine with a name; FmuError as :func:`fmu_names`."""
     if flavour not in FLAVOURS:
         raise FmuError(f"flavour must be one of {', '.join(FLAVOURS)}, got {flavour!r}")
-    check_version(flavour, fmi)
+    if fmi not in FMI_VERSIONS:
+        raise FmuError(f"the version of FMI must be one of {', '.join(FMI_VERSIONS)}, got {fmi!r}")
+    if flavour == "python" and fmi != "2":
+        raise FmuError(f"FMUs of the Python flavour are of FMI 2 alone, as pythonfmu's are, got FMI {fmi}")
     return f"{model}{_SUFFIX[flavour, fmi]}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
 
 

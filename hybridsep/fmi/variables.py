@@ -16,6 +16,8 @@ from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, 
 
 Value = float | int | bool  # a start value
 
+MODE = ("f_n", "zeta", "alpha", "beta")  # numbers of a mode of eq. (15)
+
 _PREDICTOR = PredictorSettings.fmi_parameters()
 
 PREDICTOR_SETTINGS: Mapping[str, Parameter] = {
@@ -146,7 +148,7 @@ def _modes(modes: Sequence[Mapping[str, float]]) -> list[Variable]:
     return [
         _parameter(PARAMETERS[name], mode[name], group="Physics model", label=f"mode[{i}].{name}")
         for i, mode in enumerate(modes, start=1)
-        for name in ("f_n", "zeta", "alpha", "beta")
+        for name in MODE
     ]
 
 
@@ -154,11 +156,7 @@ def modes_from(values: Mapping[str, Value]) -> list[dict[str, float]]:
     """Return the modes of the variables ``mode[i].*``; ParameterError, with its place, if one is out of its range."""
     n = sum(name.endswith(".f_n") for name in values)
     return [
-        {
-            key: check(key, values[f"mode[{i}].{key}"], label=f"mode[{i}].{key}")
-            for key in ("f_n", "zeta", "alpha", "beta")
-        }
-        for i in range(1, n + 1)
+        {key: check(key, values[f"mode[{i}].{key}"], label=f"mode[{i}].{key}") for key in MODE} for i in range(1, n + 1)
     ]
 
 
@@ -182,12 +180,9 @@ def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
     ]
     table += _look_ahead_parameters(parameters)
     table += _modes(modes)
-    for name, meaning in (
-        ("x_d", "commanded positions"),
-        ("x_pb", "physics-based predictions"),
-        ("x_h", "hybrid predictions"),
-    ):
-        meaning = f"{meaning} of the current window"
+    shown = {"x_d": "commanded positions", "x_pb": "physics-based predictions", "x_h": "hybrid predictions"}
+    for name, what in shown.items():
+        meaning = f"{what} of the current window"
         table += [_position(f"{name}_window[{i}]", "local", meaning, initially_from=ahead) for i in window]
     spread = "standard deviations of x_meas - x_h in the current window"
     table += [_position(f"x_h_std_window[{i}]", "local", spread, display_unit="um") for i in window]
@@ -273,13 +268,12 @@ def _plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[st
     ]
 
 
-def _trajectory_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
+def _trajectory_variables(parameters: Mapping[str, Value], _modes: Sequence[Mapping[str, float]]) -> list[Variable]:
     """Return the table of the ReferenceTrajectory, which has no modes."""
     meaning = "commanded position at t; wire it to x_d_ahead"
     return [
         _position("r", "output", meaning, initially_from=("trajectory",)),
         *(_parameter(PARAMETERS[name], parameters[name], group="Trajectory") for name in ("trajectory", "T_s")),
-        *_modes(modes),
     ]
 
 

@@ -23,6 +23,7 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.regression import RidgeRegression
 from ..predict.uncertainty import Uncertainty
+from .variables import MODE
 
 if TYPE_CHECKING:  # as this module is packed, and machines are not
     from ..machines.machine import Machine
@@ -32,7 +33,6 @@ _MAGIC = b"HSEPWG14"
 _HEAD = struct.Struct("<8s3Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")
-_MODE = ("f_n", "zeta", "alpha", "beta")
 _DAMAGED = f"{WEIGHTS_FILE} is damaged, truncated or from another version; train again"
 
 
@@ -43,7 +43,7 @@ def _learned_settings(settings: PredictorSettings, model: ModalModel) -> dict[st
     values: dict[str, float] = {name: numbers[name] for name in learned}
     values["dead_time"] = model.dead_time
     for i, mode in enumerate(model.modes, start=1):
-        values |= {f"mode[{i}].{name}": getattr(mode, name) for name in _MODE}
+        values |= {f"mode[{i}].{name}": getattr(mode, name) for name in MODE}
     return values
 
 

@@ -18,7 +18,7 @@ from .formats import open_source
 from .names import SIGNALS
 from .remedies import Samples, at_sensor_phase, resampled, shifted, whole_turns
 from .source import Block, Source
-from .times import NOT_LATER, given_times, recorded_times
+from .times import NOT_LATER, Times, recorded_times
 from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated_unit
 
 _OWN_NAMES = ("x_d", "x", "x_meas")  # names of columns of positions that leave no doubt
@@ -163,7 +163,8 @@ def read_log(
     x_d, x_meas = (chosen[role].unit.factor * read[role] for role in ("x_d", "x"))
     time = chosen.get("t")
     if time is None:
-        times = given_times(len(x_d), given or 0.0)  # given, as there is no time
+        T_s = given or 0.0  # given, as there is no time
+        times = Times(np.arange(len(x_d), dtype=np.float64) * T_s, T_s)
     else:
         times = recorded_times(path, time.name, read["t"], time.unit.factor, stated=time.stated, given=given)
     samples, remarks = Samples(times.t, x_d, x_meas, times.T_s, times.starts, signals), list(times.remarks)

@@ -129,7 +129,6 @@ class SinumerikSource(ArraysSource):
         return np.array(signal.values)[np.searchsorted(written, k, side="right") - 1]
 
     def _positions(self) -> dict[str, tuple[str, str]]:
-        """Return commanded and measured position by axis."""
         found: dict[str, tuple[str, str]] = {}
         for x_d, signal in self._signals.items():
             there = [

@@ -24,7 +24,7 @@ import numpy as np
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .names import n_known
-from .source import Block, Source, line_number, past_midnights
+from .source import Block, Source, past_midnights
 from .units import plain_name, position_unit, time_unit
 
 _HEAD_LINES = 1000  # lines, blank ones aside, in which names and numbers must begin
@@ -143,7 +143,7 @@ class TextSource(Source):
             columns[name] = (since - since[:1]) / _SECOND
         if self.commanded in columns:
             columns[self.commanded] = self._filled(columns[self.commanded], numbers)
-        return Block([np.ascontiguousarray(columns[name]) for name in names], line_number(numbers))
+        return Block([np.ascontiguousarray(columns[name]) for name in names], lambda i: f"line {numbers[i]}")
 
     def _filled(self, column: Array, numbers: Sequence[int]) -> Array:
         """Return the command with what is blank as before, which is noted."""

@@ -253,17 +253,10 @@ def machine_path(machine: str | Path) -> Path:
 def load_machine(machine: str | Path, changes: Iterable[str] = ()) -> Machine:
     """Read a machine file.
 
-    Parameters
-    ----------
-    machine : str or Path
-        Path of a ``.toml`` file, or name of a bundled machine.
-    changes : iterable of str
-        Entries with other values than the file's, each as ``predictor.p=20``; a word needs no quotes.
+    ``machine``: path of a ``.toml`` file, or name of a bundled machine; ``changes``: entries with other values than the
+    file's, each as ``predictor.p=20``; a word needs no quotes.
 
-    Raises
-    ------
-    MachineError
-        If there is no such file, it is not TOML, or an entry is missing, unknown or out of range.
+    MachineError if there is no such file, it is not TOML, or an entry is missing, unknown or out of range.
     """
     path = machine_path(machine)
     try:

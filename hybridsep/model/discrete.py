@@ -77,7 +77,6 @@ class DiscreteModel:
         return x_pb, self._powers[n] @ s + self._K[:, self._block - n :] @ u
 
     def _tabulate(self) -> None:
-        """Tabulate the lifted matrices for windows of up to ``block`` samples."""
         m, n = self._block, self._n
         self._powers = np.empty((m + 1, n, n))  # A⁰ … Aᵐ
         self._powers[0] = np.eye(n)

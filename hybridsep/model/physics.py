@@ -31,19 +31,10 @@ MODES_MAX = 100  # largest number of modes; the discrete model's tables grow wit
 class Mode:
     """One mode of eq. (15), ``(α + β s) / (s² + 2 ζ ω s + ω²)`` with ``ω = 2π f_n``.
 
-    Parameters
-    ----------
-    f_n : float
-        Natural frequency, Hz.
-    zeta : float
-        Damping ratio; 1 is critical, more is over-damped.
-    alpha, beta : float
-        Numerator, 1/s² and 1/s.
+    ``f_n``: natural frequency, Hz; ``zeta``: damping ratio, 1 is critical, more is over-damped; ``alpha``, ``beta``:
+    numerator, 1/s² and 1/s.
 
-    Raises
-    ------
-    ParameterError
-        If a value is not finite or out of range; ``zeta ≤ 0`` would be an unstable model.
+    ParameterError if a value is not finite or out of range; ``zeta ≤ 0`` would be an unstable model.
     """
 
     f_n: float
@@ -65,17 +56,9 @@ class Mode:
 class ModalModel:
     """Linear, causal, stable drive model: a sum of modes with input dead time, eq. (15).
 
-    Parameters
-    ----------
-    modes : sequence of Mode
-        1 … :data:`MODES_MAX`.
-    dead_time : int
-        Input delay, samples.
+    ``modes``: 1 … :data:`MODES_MAX`; ``dead_time``: input delay, samples.
 
-    Raises
-    ------
-    ParameterError
-        If there is no mode or too many, or ``dead_time`` is not a whole number ≥ 0.
+    ParameterError if there is no mode or too many, or ``dead_time`` is not a whole number ≥ 0.
     """
 
     modes: tuple[Mode, ...]

@@ -124,10 +124,7 @@ def spiral(
 ) -> tuple[Array, Array]:
     """Return the commands of X and Y for the paper's spiral from the centre, 5 turns, 30 mm, eq. (14) along the path.
 
-    Returns
-    -------
-    x_d, y_d : (n,) arrays, m
-        5.9 s at the default values.
+    Each is ``(n,)``, m, 5.9 s at the default values.
     """
     position, derivative, end = archimedean_spiral(radius, turns)
     points = along_path(position, derivative, end, limits, T_s)
