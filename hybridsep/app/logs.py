@@ -114,16 +114,15 @@ def read_checked(path: Path, reading: options.ReadingOptions, machine: Machine) 
     import numpy as np
 
     from ..logs.checks import checked
-    from ..logs.log import read_log
-    from ..logs.remedies import Samples, whole_turns
+    from ..logs.log import read_log, whole_turns
     from ..machines.machine import check_interval, check_unit
 
     log = read_log(path, **reading.arguments(machine))
     check_unit(path.name, log, machine)
     log = replace(log, unit=machine.unit)
     if log.unit == "rad":  # where the file states none
-        turned, said = whole_turns(Samples(log.t, log.x_d, log.x_meas, log.T_s, log.starts))
-        log = replace(log, x_d=turned.x_d, x_meas=turned.x_meas, remarks=(*log.remarks, *([said] if said else [])))
+        log, said = whole_turns(log)
+        log = replace(log, remarks=(*log.remarks, *([said] if said else [])))
     check_interval(path.name, log.T_s, machine)
     if not machine.predictor_settings.averaging and np.isnan(log.x_meas).any():
         first = int(np.argmax(np.isnan(log.x_meas)))

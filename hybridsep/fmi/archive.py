@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 from ..base.errors import FmuError
 from ..base.files import atomic_open
 from ..machines.machine import Machine
-from . import FLAVOURS, FMI_VERSIONS, native, python
+from . import native, python
 from .compile import ALL_TARGETS, default_targets, expanded
 from .spec import FmuSpec, fmu_name, fmu_names
+from .variables import FLAVOURS, FMI_VERSIONS
 from .weights import saved_weights
 
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)

@@ -17,8 +17,7 @@ from ..machines.machine import PAPER_SETTINGS, Machine
 from ..machines.sections import FeedDriveSection, IdentifiedSection
 from ..model.physics import ModalModel
 from ..plants.trajectory import staircase
-from . import FLAVOURS, FMI_VERSIONS
-from .variables import SAMPLES_TRAJECTORY, FmuTable
+from .variables import FLAVOURS, FMI_VERSIONS, SAMPLES_TRAJECTORY, FmuTable
 
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 

@@ -14,6 +14,9 @@ from typing import Any
 from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 
+FLAVOURS = ("native", "python")  # of FMUs; the default first
+FMI_VERSIONS = ("2", "3")  # FMI 2.0 and FMI 3.0; the default first
+
 Value = float | int | bool  # a start value
 
 MODE = ("f_n", "zeta", "alpha", "beta")  # numbers of a mode of eq. (15)
