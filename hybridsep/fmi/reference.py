@@ -14,6 +14,7 @@ import numpy as np
 
 from ..base.settings import CompensatorSettings, PredictorSettings, samples_before
 from ..base.threads import one_blas_thread
+from ..compensate.compensator import SepCompensator
 from ..machines.machine import Machine
 from ..online.look_ahead import LookAhead
 from ..plants.plant import Encoder
@@ -101,10 +102,8 @@ def _look_ahead_rows(spec: FmuSpec) -> Rows:
     predictor, compensates = HybridPredictor(machine.model, settings), "x_dm" in names
     if spec.weights is not None:
         restore_weights(predictor, spec.weights)
-    model: Any = predictor
+    model: HybridPredictor | SepCompensator = predictor
     if compensates:
-        from ..compensate.compensator import SepCompensator
-
         model = SepCompensator(predictor, CompensatorSettings.from_fmi(parameters))
     look_ahead = LookAhead(model, spec.table.rest, unit=machine.unit)
     warm_up = max(samples_before(settings.warm_up, machine.T_s), int(parameters.get("preview", 0)))

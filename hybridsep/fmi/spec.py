@@ -19,19 +19,29 @@ from ..model.physics import ModalModel
 from ..plants.trajectory import staircase
 from .variables import FLAVOURS, FMI_VERSIONS, SAMPLES_TRAJECTORY, FmuTable
 
+AUTHOR = "the hybridsep authors"
+COPYRIGHT = f"Copyright (c) 2026, {AUTHOR}"  # the line of LICENSE
+
+_TITLES = {
+    "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
+    "SepCompensator": "servo error pre-compensation: modifies the command so that the drive follows it",
+    "FeedDrive": "nonlinear feed drive with encoder noise",
+    "ReferenceTrajectory": "Source of commands: plays the paper's staircase and spirals, or given samples",
+}
+
+_WITHOUT_TRAJECTORY = 10.0  # end of the default experiment of a machine without limits, s
+
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 
 
 @dataclass(frozen=True, eq=False)
 class FmuSpec:
-    """A machine on its way into an archive: names, table, title and default experiment, resolved once."""
+    """A machine on its way into an archive."""
 
     machine: Machine
     table: FmuTable  # model, model identifier, start values and variables
     flavour: str  # {"native", "python"}
     fmi: str  # {"2", "3"}: version of FMI
-    title: str  # description of the FMU
-    stop_time: float  # s: end of the default experiment
     samples: Array | None = None  # (n,), m: trajectory 3 of a ReferenceTrajectory
     weights: bytes | None = None  # weights file with which a HybridPredictor or SepCompensator starts warm
 
@@ -58,8 +68,36 @@ class FmuSpec:
             as_samples(played[:1], "samples", 1)
         name, built_in = fmu_name(model, machine.name, flavour, fmi), {"samples": played is not None}
         table = table_of(machine, model, name, **built_in, warm=weights is not None, windows=windows, rest=rest)
-        title, end = _title(machine, model), _stop_time(machine, table, played)
-        return cls(machine, table, flavour, fmi, title, end, played, weights)
+        return cls(machine, table, flavour, fmi, played, weights)
+
+    @property
+    def title(self) -> str:
+        """Description, with a predictor's settings of the paper; ReferenceTrajectory's is every machine's."""
+        machine, model = self.machine, self.table.model
+        if model == "ReferenceTrajectory":
+            return _TITLES[model]
+        title = f"{machine.title}: {_TITLES[model]}"
+        if model != "HybridPredictor" or machine.name not in PAPER_SETTINGS:
+            return title
+        settings = ", ".join(f"{name} = {json.dumps(value)}" for name, value in PAPER_SETTINGS[machine.name].items())
+        return f"{title}; the paper's settings are {settings}"
+
+    @property
+    def stop_time(self) -> float:
+        """End of the default experiment, s: of the samples, or of the machine's trajectory, after the look-ahead.
+
+        With ``[limits]`` the trajectory is the staircase within them; without it is 10 s.
+        """
+        machine = self.machine
+        if self.samples is not None:
+            n = len(self.samples)
+        elif machine.limits is not None:
+            n = len(staircase(machine.T_s, limits=machine.trajectory_limits()))
+        else:
+            return _WITHOUT_TRAJECTORY
+        # A compensator delays by its preview, everything else runs beside a predictor.
+        delay = int(self.table.parameters.get("preview", machine.predictor_settings.Np))
+        return round((n - 1 + delay) * machine.T_s, 9)
 
 
 def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
@@ -141,28 +179,6 @@ def _modes(model: ModalModel) -> tuple[dict[str, float], ...]:
     return tuple(asdict(mode) for mode in model.modes)
 
 
-AUTHOR = "the hybridsep authors"
-COPYRIGHT = f"Copyright (c) 2026, {AUTHOR}"  # the line of LICENSE
-
-_TITLES = {
-    "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
-    "SepCompensator": "servo error pre-compensation: modifies the command so that the drive follows it",
-    "FeedDrive": "nonlinear feed drive with encoder noise",
-    "ReferenceTrajectory": "Source of commands: plays the paper's staircase and spirals, or given samples",
-}
-
-
-def _title(machine: Machine, model: str) -> str:
-    """Return the title, with a predictor's settings of the paper; ReferenceTrajectory's is every machine's."""
-    if model == "ReferenceTrajectory":
-        return _TITLES[model]
-    title = f"{machine.title}: {_TITLES[model]}"
-    if model != "HybridPredictor" or machine.name not in PAPER_SETTINGS:
-        return title
-    settings = ", ".join(f"{name} = {json.dumps(value)}" for name, value in PAPER_SETTINGS[machine.name].items())
-    return f"{title}; the paper's settings are {settings}"
-
-
 def content_guid(files: Mapping[str, bytes], table: FmuTable) -> str:
     """Return a GUID that follows from table and files (archive name → content), and from nothing else.
 
@@ -172,22 +188,3 @@ def content_guid(files: Mapping[str, bytes], table: FmuTable) -> str:
     for arcname in sorted(files):
         digest.update(arcname.encode() + hashlib.sha256(files[arcname]).digest())
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
-
-
-_WITHOUT_TRAJECTORY = 10.0  # s
-
-
-def _stop_time(machine: Machine, table: FmuTable, samples: Array | None) -> float:
-    """Return the end of the samples, or of the machine's trajectory, with the look-ahead's delay, s.
-
-    With ``[limits]`` the trajectory is the staircase within them; without it is 10 s.
-    """
-    if samples is not None:
-        n = len(samples)
-    elif machine.limits is not None:
-        n = len(staircase(machine.T_s, limits=machine.trajectory_limits()))
-    else:
-        return _WITHOUT_TRAJECTORY
-    # A compensator delays by its preview, everything else runs beside a predictor.
-    delay = int(table.parameters.get("preview", machine.predictor_settings.Np))
-    return round((n - 1 + delay) * machine.T_s, 9)

@@ -39,6 +39,7 @@ _REJECTED = "measurements that were missing or not plausible, with averaging; co
 _NO_MEASUREMENT = (
     "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
 )
+_STD = "standard deviation of x_meas - x_h, now; 0: not known"
 _ALARM = "whether the compensator has tripped: x_meas - x_d was above following_error_max for three samples in a row"
 # no input: several masters set all inputs by setReal
 _RESET = "a rising edge ends a trip; what was learned before it stays"
@@ -174,7 +175,7 @@ def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
             "x_pb", "output", "physics-based prediction for now, made when the window began", initially_from=ahead
         ),
         _position("x_h", "output", "hybrid prediction for now, made when the window began", initially_from=ahead),
-        _position("x_h_std", "output", "standard deviation of x_meas - x_h, now; 0: not known", display_unit="um"),
+        _position("x_h_std", "output", _STD, display_unit="um"),
         _position("e_servo", "output", "predicted servo error x_d - x_h", display_unit="um"),
         Variable("hybrid_active", "Boolean", "output", "discrete", "whether x_h is the hybrid prediction now"),
         *_RUNNING_ERRORS,
@@ -196,6 +197,9 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
     ahead = ("x_d_ahead",)
     # With weights from an earlier run and no warm-up, the hybrid model may plan the first window already.
     model = ("t_init", "compensate", "averaging")
+    plan = (*ahead, *model)
+    prediction = "prediction for now under x_dm, with averaging by its model, else by the model that planned the window"
+    error = "predicted servo error x_d - x_h that is left"
     state = "model that planned what x_dm follows now"
     return [
         _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
@@ -203,26 +207,9 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
         _position("x_dm", "output", "modified command now; wire it to the drive", initially_from=ahead),
         _position("x_d", "output", "commanded position now: x_d_ahead, preview samples later", initially_from=ahead),
         _position("x_pb", "output", "physics-based prediction for now under x_dm", initially_from=ahead),
-        _position(
-            "x_h",
-            "output",
-            "prediction for now under x_dm, with averaging by its model, else by the model that planned the window",
-            initially_from=(*ahead, *model),
-        ),
-        _position(
-            "x_h_std",
-            "output",
-            "standard deviation of x_meas - x_h, now; 0: not known",
-            display_unit="um",
-            initially_from=(*ahead, *model, "lambda", "noise_std"),
-        ),
-        _position(
-            "e_servo",
-            "output",
-            "predicted servo error x_d - x_h that is left",
-            display_unit="um",
-            initially_from=(*ahead, *model),
-        ),
+        _position("x_h", "output", prediction, initially_from=plan),
+        _position("x_h_std", "output", _STD, display_unit="um", initially_from=(*plan, "lambda", "noise_std")),
+        _position("e_servo", "output", error, display_unit="um", initially_from=plan),
         Variable(
             "sep_state",
             "Enumeration",
