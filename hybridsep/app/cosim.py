@@ -232,7 +232,7 @@ def _check_pair(
     axis: Machine, model: str, predictor: Path | None, plant: Path | None, weights: Path | None, entries: Sequence[str]
 ) -> None:
     """Check the FMUs of a look-ahead ``model`` and a plant: those that are given, and that the others can be built."""
-    from ..cosim.adapters import check_controller, check_plant
+    from ..cosim.loop import check_controller, check_plant
     from ..cosim.run import COMPENSATOR, PREDICTOR
     from ..fmi.compile import check_available
 

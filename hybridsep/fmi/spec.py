@@ -29,8 +29,6 @@ _TITLES = {
     "ReferenceTrajectory": "Source of commands: plays the paper's staircase and spirals, or given samples",
 }
 
-_WITHOUT_TRAJECTORY = 10.0  # end of the default experiment of a machine without limits, s
-
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 
 
@@ -94,7 +92,7 @@ class FmuSpec:
         elif machine.limits is not None:
             n = len(staircase(machine.T_s, limits=machine.trajectory_limits()))
         else:
-            return _WITHOUT_TRAJECTORY
+            return 10.0
         # A compensator delays by its preview, everything else runs beside a predictor.
         delay = int(self.table.parameters.get("preview", machine.predictor_settings.Np))
         return round((n - 1 + delay) * machine.T_s, 9)

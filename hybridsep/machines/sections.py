@@ -125,12 +125,6 @@ def _is_line(value: Any) -> bool:
     return isinstance(value, str) and _LINE.fullmatch(value) is not None
 
 
-def name_entry() -> Any:
-    """Declare the entry of a machine's name."""
-    what = "a letter, then at most 99 letters, digits and _"
-    return _text_entry(lambda value: isinstance(value, str) and bool(re.fullmatch(NAME_PATTERN, value)), what)
-
-
 def line_entry(default: Any = MISSING) -> Any:
     """Declare an entry of one line of text."""
     return _text_entry(_is_line, _LINE_WORDS, default)
@@ -351,7 +345,10 @@ def _own(settings: type[PredictorSettings | CompensatorSettings]) -> dict[str, P
 class FileSection(Section):
     """All entries of a machine file; what the section of the compensator leaves out is as the predictor's."""
 
-    name: str = name_entry()
+    name: str = _text_entry(
+        lambda value: isinstance(value, str) and bool(re.fullmatch(NAME_PATTERN, value)),
+        "a letter, then at most 99 letters, digits and _",
+    )
     title: str = line_entry()
     sources: tuple[str, ...] = lines_entry()
     T_s: float = parameter_entry("T_s", PARAMETERS["T_s"].default)
