@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @options.takes_reading
 @options.takes_known
 def fit(
-    logs: options.LogsArgument,
+    logs: Annotated[list[Path], typer.Argument(help="Recorded logs of one axis: commanded and measured positions.")],
     out: Annotated[
         Path | None, typer.Option(help="Folder for machine file, FMUs and report; named after the log if left out.")
     ] = None,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..base.errors import LogError
+from ..base.errors import LogError, ParameterError
 from . import options
 
 if TYPE_CHECKING:
@@ -20,10 +20,19 @@ if TYPE_CHECKING:
 
 @options.takes_reading
 def backtest(
-    log: options.LogArgument,
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help="Recorded log with the columns t, x_d, x_meas or x, in a format of docs/reference/logs.md: "
+            "CSV, .mat, …"
+        ),
+    ],
     machine: options.MachineOption,
     entries: options.SetOption = None,
-    weights: options.SavedOption = None,
+    weights: Annotated[
+        Path | None,
+        typer.Option(help="A predictor saved with hybridsep backtest --save, to begin with what it learned."),
+    ] = None,
     *,
     reading: options.ReadingOptions,
     report: Annotated[Path | None, typer.Option(help="HTML file about the replay, which needs no network.")] = None,
@@ -115,15 +124,22 @@ def read_checked(path: Path, reading: options.ReadingOptions, machine: Machine) 
 
     from ..logs.checks import checked
     from ..logs.log import read_log, whole_turns
-    from ..machines.machine import check_interval, check_unit
 
     log = read_log(path, **reading.arguments(machine))
-    check_unit(path.name, log, machine)
+    if log.unit_stated and log.unit != machine.unit:
+        raise ParameterError(
+            f"{path.name} is in {log.unit}, but machine {machine.name} has unit = {machine.unit!r}; correct the "
+            "machine file, or say the log's unit (--unit)"
+        )
     log = replace(log, unit=machine.unit)
     if log.unit == "rad":  # where the file states none
         log, said = whole_turns(log)
         log = replace(log, remarks=(*log.remarks, *([said] if said else [])))
-    check_interval(path.name, log.T_s, machine)
+    if abs(log.T_s - machine.T_s) > 0.01 * machine.T_s:
+        raise ParameterError(
+            f"{path.name} is sampled every {log.T_s:g} s, but machine {machine.name} has T_s = {machine.T_s:g} s; "
+            "resample the file, say its unit of time in the column's name, or correct T_s"
+        )
     if not machine.predictor_settings.averaging and np.isnan(log.x_meas).any():
         first = int(np.argmax(np.isnan(log.x_meas)))
         raise LogError(

@@ -265,7 +265,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             call()
             do_step(t, h)
 
-        return partial(self._call_open, step)
+        return partial(self._call, step)
 
     def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
         """Return a function that gets these variables in one FMI call for each type, an array's one after the other."""
@@ -282,7 +282,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             values = [value for _, buffer in prepared for value in buffer]
             return [values[place] for place in places]
 
-        return partial(self._call_open, read)
+        return partial(self._call, read)
 
     def step(self, t: float, h: float) -> None:
         """Do one communication step from ``t`` by ``h`` seconds."""
@@ -334,12 +334,9 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def _call_state(self, verb: str, *arguments: Any) -> Any:
         return self._call(getattr(self.slave, f"{verb}{self._version.state}"), *arguments)
 
-    def _call_open(self, function: Callable[..., Any], *arguments: Any) -> Any:
+    def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         """Call a function that was made for this instance, if it is still open."""
         _ = self.slave
-        return self._call(function, *arguments)
-
-    def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         try:
             return function(*arguments, **keywords)
         except (FMICallException, OSError) as error:  # on Windows ctypes raises OSError where others have a signal

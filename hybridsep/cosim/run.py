@@ -167,11 +167,8 @@ class Run:
         differences; the share of the samples that each model planned, 0 … 1.
         """
         figures: dict[str, float | int] = {}
-        for name, signal in (
-            ("tracking", self.error),
-            ("tracking_measured", self.x_d - self.x_meas),
-            ("change", self.change),
-        ):
+        signals = {"tracking": self.error, "tracking_measured": self.x_d - self.x_meas, "change": self.change}
+        for name, signal in signals.items():
             figures[f"{name}_rms_um"] = 1e6 * metrics.rms(signal)
             figures[f"{name}_max_um"] = 1e6 * metrics.largest(signal)
         peaks = metrics.peak_derivatives(self.x_dm, self.T_s)

@@ -31,6 +31,13 @@ _MEASURED = (re.compile(r"actpos", re.IGNORECASE), re.compile(r"measpos", re.IGN
 
 _NOT_A_NUMBER = 9.2188684e18  # values above are the bits of a NaN, written as a whole number: there is none
 
+_SIGNALS = b'"SignalListHFData"'  # in Capture's JSON
+_COUNTER = "CYCLE"
+_TIME = "t"  # name of the time column, which is made from the counter of cycles
+
+_ROTARY = ("A", "B", "C", "SP", "S")
+"""Beginnings of the names of rotary axes and spindles, whose positions are in degrees; others are in millimetres."""
+
 
 @dataclass
 class _Signal:
@@ -142,16 +149,6 @@ class SinumerikSource(ArraysSource):
             if there and _COMMANDED.search(signal.name):
                 found.setdefault(signal.axis, (x_d, there[0]))
         return found
-
-
-# Capture --------------------------------------------------------------------------------------------------------------
-
-_SIGNALS = b'"SignalListHFData"'
-_COUNTER = "CYCLE"
-_TIME = "t"  # name of the time column, which is made from the counter of cycles
-
-_ROTARY = ("A", "B", "C", "SP", "S")
-"""Beginnings of the names of rotary axes and spindles, whose positions are in degrees; others are in millimetres."""
 
 
 class CaptureSource(ArraysSource):
