@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..base.errors import LogError, ParameterError
+from ..base.errors import LogError
 from . import options
 
 if TYPE_CHECKING:
@@ -124,22 +124,15 @@ def read_checked(path: Path, reading: options.ReadingOptions, machine: Machine) 
 
     from ..logs.checks import checked
     from ..logs.log import read_log, whole_turns
+    from ..machines.machine import check_interval, check_unit
 
     log = read_log(path, **reading.arguments(machine))
-    if log.unit_stated and log.unit != machine.unit:
-        raise ParameterError(
-            f"{path.name} is in {log.unit}, but machine {machine.name} has unit = {machine.unit!r}; correct the "
-            "machine file, or say the log's unit (--unit)"
-        )
+    check_unit(path.name, log, machine)
     log = replace(log, unit=machine.unit)
     if log.unit == "rad":  # where the file states none
         log, said = whole_turns(log)
         log = replace(log, remarks=(*log.remarks, *([said] if said else [])))
-    if abs(log.T_s - machine.T_s) > 0.01 * machine.T_s:
-        raise ParameterError(
-            f"{path.name} is sampled every {log.T_s:g} s, but machine {machine.name} has T_s = {machine.T_s:g} s; "
-            "resample the file, say its unit of time in the column's name, or correct T_s"
-        )
+    check_interval(path.name, log.T_s, machine)
     if not machine.predictor_settings.averaging and np.isnan(log.x_meas).any():
         first = int(np.argmax(np.isnan(log.x_meas)))
         raise LogError(

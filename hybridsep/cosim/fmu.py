@@ -122,6 +122,9 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     Instances may live in several threads, each used by one thread at a time: they are loaded one after the other and
     step in parallel. While one is loaded, the working directory of the process is another for some milliseconds.
 
+    FmuError if the archive cannot be read, is no FMI 2.0 or 3.0 co-simulation FMU, has no library for this platform, or
+    refuses to be instantiated. A library's code runs in this process, and a damaged one may end it.
+
     Parameters
     ----------
     path : str or Path
@@ -136,12 +139,6 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         fmpy's variables by name.
     log : list of (status, message)
         Messages of the FMU's logger; at most the last 1000.
-
-    Raises
-    ------
-    FmuError
-        If the archive cannot be read, is no FMI 2.0 or 3.0 co-simulation FMU, has no library for this platform, or
-        refuses to be instantiated. A library's code runs in this process, and a damaged one may end it.
     """
 
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:

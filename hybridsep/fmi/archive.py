@@ -41,7 +41,7 @@ def build_fmu(
     windows: bool = True,
     embed_weights: bool = False,
 ) -> Path:
-    """Build one FMU.
+    """Build one FMU; return its path, ``out/name.fmu``.
 
     Parameters
     ----------
@@ -67,11 +67,6 @@ def build_fmu(
         Whether a HybridPredictor shows the samples of its window, ``4·Np`` scalars or four arrays.
     embed_weights : bool
         Whether a native FMU's sources have the weights compiled in, for targets without files.
-
-    Returns
-    -------
-    Path
-        ``out/name.fmu``.
 
     Raises
     ------

@@ -28,6 +28,7 @@ else:
 
 if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs none
     from ..compensate.compensator import SepCompensator
+    from ..logs.log import Log
     from ..predict.predictor import HybridPredictor
 
 
@@ -295,6 +296,25 @@ def machine_from_table(content: Mapping[str, Any]) -> Machine:
     if machine is None:
         raise ParameterError(listed(problems, str, "; "))
     return machine
+
+
+def check_interval(name: str, T_s: float, axis: Machine) -> None:
+    """Raise ParameterError if a file's sampling interval is not the machine's."""
+    if abs(T_s - axis.T_s) <= 0.01 * axis.T_s:
+        return
+    raise ParameterError(
+        f"{name} is sampled every {T_s:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; resample the file, say "
+        "its unit of time in the column's name, or correct T_s"
+    )
+
+
+def check_unit(name: str, log: "Log", axis: Machine) -> None:
+    """Raise ParameterError if a log states lengths for a rotary axis, or angles for a linear one."""
+    if log.unit_stated and log.unit != axis.unit:
+        raise ParameterError(
+            f"{name} is in {log.unit}, but machine {axis.name} has unit = {axis.unit!r}; correct the machine file, or "
+            "say the log's unit (--unit)"
+        )
 
 
 def machine_name(path: Path, axis: str | None = None) -> str:

@@ -157,6 +157,8 @@ _KIND = "look-ahead"
 class LookAhead:
     """Delay line of commands, with the position predicted ahead, and the commands modified by a planner.
 
+    SignalError if its ``start`` is not finite.
+
     Parameters
     ----------
     model : HybridPredictor or Planner
@@ -182,10 +184,6 @@ class LookAhead:
     diverged : str
         Message of the window that diverged, after which every sample is refused; empty before.
 
-    Raises
-    ------
-    SignalError
-        If ``start`` is not finite.
     """
 
     diverged: str = ""

@@ -39,7 +39,9 @@ def rest_to_rest(
     dwell: float = 0.0,
     duration: float | None = None,
 ) -> Array:
-    """Return a sequence of time-optimal, jerk-limited rest-to-rest moves.
+    """Return a sequence of time-optimal, jerk-limited rest-to-rest moves, ``(n,)``, m.
+
+    The samples are at ``0, T_s, …``, the last one at or after the end.
 
     Parameters
     ----------
@@ -55,11 +57,6 @@ def rest_to_rest(
         Rest between moves, s, when no start times are given.
     duration : float, optional
         Duration, s; to the end of the last move and its dwell if left out.
-
-    Returns
-    -------
-    x_d : (n,) array, m
-        Samples at ``0, T_s, …``, the last one at or after the end.
 
     Raises
     ------
