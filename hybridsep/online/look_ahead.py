@@ -183,7 +183,6 @@ class LookAhead:
         The window that ``k`` is part of.
     diverged : str
         Message of the window that diverged, after which every sample is refused; empty before.
-
     """
 
     diverged: str = ""
