@@ -15,8 +15,7 @@ from hybridsep.app.cli import EXAMPLES, app
 from hybridsep.base.files import DEFAULT_MACHINE
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import CompensatorSettings
-from hybridsep.fmi.description import TERMINALS
-from hybridsep.fmi.pages import grouped_table
+from hybridsep.fmi.description import TERMINALS, grouped_table
 from hybridsep.fmi.spec import table_of
 from hybridsep.machines.machine import Machine
 from hybridsep.machines.sections import Section, entries

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from hybridsep import Encoder, Machine, backtest, paper_machine, simulate, spiral
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
-from hybridsep.demo.page import PRINTED
+from hybridsep.demo.cases import PRINTED
 from hybridsep.machines.sections import StageSection
 
 KAPPA_OVER_F = 1.5e3  # 1/m²

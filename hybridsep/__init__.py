@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from .base.errors import HybridSepError
     from .base.settings import CompensatorSettings, Limits, PredictorSettings
     from .compensate.compensator import SepCompensator
-    from .cosim.adapters import Compensator
     from .cosim.fmu import FmuInstance
-    from .cosim.loop import cosimulate
+    from .cosim.loop import Compensator, cosimulate
     from .cosim.run import Run
     from .evaluate.backtest import backtest
     from .fitting.fit import fit
@@ -47,9 +46,8 @@ _MODULES = {
         "base.errors": "HybridSepError",
         "base.settings": "CompensatorSettings Limits PredictorSettings",
         "compensate.compensator": "SepCompensator",
-        "cosim.adapters": "Compensator",
         "cosim.fmu": "FmuInstance",
-        "cosim.loop": "cosimulate",
+        "cosim.loop": "Compensator cosimulate",
         "cosim.run": "Run",
         "evaluate.backtest": "backtest",
         "fitting.fit": "fit",

@@ -9,7 +9,7 @@ from hybridsep.base.state import pack, unpack
 from hybridsep.fmi.variables import modes_from
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Drive, Encoder
+from hybridsep.plants.plant import Encoder
 from hybridsep.plants.stage_drive import StageDrive
 
 
@@ -45,7 +45,7 @@ class FeedDrivePy(slave.Slave):
         self.plant, self.encoder = plant, Encoder(self.values["noise_std"], self.values["seed"])
         self.encoder.n_draws, self.x_meas = meta["n_draws"], meta["x_meas"]
 
-    def _new_plant(self) -> Drive:
+    def _new_plant(self) -> FeedDrive | StageDrive:
         values = self.values
         modes = modes_from(values)
         if modes:

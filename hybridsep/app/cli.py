@@ -72,7 +72,6 @@ class _Commands(TyperGroup):
     """
 
     def invoke(self, ctx: typer.Context) -> Any:  # type: ignore[override]
-        """Run the command that the arguments name."""
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
@@ -91,7 +90,6 @@ class _Commands(TyperGroup):
             raise typer.Exit(130) from None
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of all commands."""
         return [*super().list_commands(ctx), *sorted(_plug_ins())]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
@@ -216,7 +214,3 @@ def _abandon_stdout() -> None:
         descriptor = os.open(os.devnull, os.O_WRONLY)
         os.dup2(descriptor, sys.stdout.fileno())
         os.close(descriptor)
-
-
-if __name__ == "__main__":
-    main()

@@ -29,7 +29,6 @@ class _WholeLines(Console):
     """Console that breaks no line of text where it is no terminal: what reads it may look for one."""
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print as rich does."""
         if not self.is_terminal and all(isinstance(one, str) for one in objects):
             options.setdefault("soft_wrap", True)
         super().print(*objects, **options)

@@ -14,18 +14,7 @@ import typer
 from ..base.errors import ParameterError
 from ..base.files import COMMANDS, DEFAULT_MACHINE
 from ..base.settings import PARAMETERS, Limits, check
-from .options import (
-    TRAJECTORIES,
-    CompensateOption,
-    ForceOption,
-    JsonOption,
-    MachineOption,
-    SetOption,
-    TargetOption,
-    TrajectoryOption,
-    UnitOption,
-    WeightsOption,
-)
+from . import options
 
 if TYPE_CHECKING:
     from ..base.signals import Array
@@ -40,17 +29,17 @@ def cosim(
         Path | None,
         typer.Option(help="Path of two axes: a G-code program (G0 to G4), or a log with the commands x and y."),
     ] = None,
-    machine: MachineOption = DEFAULT_MACHINE,
-    entries: SetOption = None,
-    trajectory: TrajectoryOption = None,
-    unit: UnitOption = None,
-    compensate: CompensateOption = None,
+    machine: options.MachineOption = DEFAULT_MACHINE,
+    entries: options.SetOption = None,
+    trajectory: options.TrajectoryOption = None,
+    unit: options.UnitOption = None,
+    compensate: options.CompensateOption = None,
     predictor: Annotated[
         Path | None,
         typer.Option(help="Predictor FMU, or with --compensate a compensator FMU; built from the machine if left out."),
     ] = None,
     plant: Annotated[Path | None, typer.Option(help="Plant FMU; built from the machine if left out.")] = None,
-    weights: WeightsOption = None,
+    weights: options.WeightsOption = None,
     *,
     out: Annotated[Path | None, typer.Option(help="File for all signals, .csv or .npz.")] = None,
     figure: Annotated[
@@ -60,8 +49,8 @@ def cosim(
             "along it."
         ),
     ] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.ForceOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Co-simulate a predictor or compensator FMU with a plant FMU.
 
@@ -216,7 +205,7 @@ def _path_limits(axis: Machine) -> tuple[float, ...]:
 
 
 def _file(trajectory: str) -> str | None:
-    return None if trajectory in TRAJECTORIES else trajectory
+    return None if trajectory in options.TRAJECTORIES else trajectory
 
 
 def _command(trajectory: str | None, machine: str, axis: Machine, unit: str | None) -> tuple[str, Array]:
@@ -230,11 +219,11 @@ def _command(trajectory: str | None, machine: str, axis: Machine, unit: str | No
     check_reading(unit, None)
     if trajectory is None:
         beside = Path(machine).with_name(COMMANDS)
-        trajectory = str(beside) if machine.endswith(".toml") and beside.is_file() else TRAJECTORIES[0]
+        trajectory = str(beside) if machine.endswith(".toml") and beside.is_file() else options.TRAJECTORIES[0]
     limits = PAPER_LIMITS if axis.limits is None else axis.trajectory_limits()
     if trajectory == "staircase":
         return trajectory, staircase(axis.T_s, limits=limits)
-    if trajectory in TRAJECTORIES:
+    if trajectory in options.TRAJECTORIES:
         return trajectory, spiral(axis.T_s, limits=limits)[trajectory == "spiral_y"]
     return trajectory, read_trajectory(trajectory, unit=unit, T_s=axis.T_s)[0]
 
@@ -243,7 +232,7 @@ def _check_pair(
     axis: Machine, model: str, predictor: Path | None, plant: Path | None, weights: Path | None, entries: Sequence[str]
 ) -> None:
     """Check the FMUs of a look-ahead ``model`` and a plant: those that are given, and that the others can be built."""
-    from ..cosim.adapters import check_controller, check_plant
+    from ..cosim.loop import check_controller, check_plant
     from ..cosim.run import COMPENSATOR, PREDICTOR
     from ..fmi.compile import check_available
 
@@ -266,19 +255,19 @@ def _check_pair(
 
 
 def system(
-    machine: MachineOption = DEFAULT_MACHINE,
-    compensate: CompensateOption = None,
-    trajectory: TrajectoryOption = None,
-    unit: UnitOption = None,
-    weights: WeightsOption = None,
+    machine: options.MachineOption = DEFAULT_MACHINE,
+    compensate: options.CompensateOption = None,
+    trajectory: options.TrajectoryOption = None,
+    unit: options.UnitOption = None,
+    weights: options.WeightsOption = None,
     ssp: Annotated[
         str, typer.Option(help="Version of SSP: 1 with FMI 2.0 FMUs, or 2 with FMI 3.0 FMUs, for tools that read it.")
     ] = "1",
-    target: TargetOption = None,
+    target: options.TargetOption = None,
     out: Annotated[
         Path | None, typer.Option(help="The archive, .ssp; named after the machine in this folder if left out.")
     ] = None,
-    force: ForceOption = False,
+    force: options.ForceOption = False,
 ) -> None:
     """Write a whole system as one file, SSP 1.0 or 2.0.
 

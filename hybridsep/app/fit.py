@@ -11,16 +11,16 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, Limits
-from .options import ForceOption, JsonOption, LogsArgument, ReadingOptions, takes_known, takes_reading
+from . import options
 
 if TYPE_CHECKING:
     from ..fitting.fit import Fit
 
 
-@takes_reading
-@takes_known
+@options.takes_reading
+@options.takes_known
 def fit(
-    logs: LogsArgument,
+    logs: Annotated[list[Path], typer.Argument(help="Recorded logs of one axis: commanded and measured positions.")],
     out: Annotated[
         Path | None, typer.Option(help="Folder for machine file, FMUs and report; named after the log if left out.")
     ] = None,
@@ -59,13 +59,13 @@ def fit(
     name: Annotated[str | None, typer.Option(help="Name of the axis; the log's, with --axis, if left out.")] = None,
     *,
     known: dict[str, float],
-    reading: ReadingOptions,
+    reading: options.ReadingOptions,
     list_channels: Annotated[
         bool,
         typer.Option("--list-channels", help="Print what the log holds, with units, and do nothing else."),
     ] = False,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.ForceOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """From the log of an axis to its model, FMUs and a report."""
     from ..logs.log import read_log

@@ -9,8 +9,8 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.files import DEFAULT_MACHINE
-from ..fmi.flavours import FLAVOURS, FMI_VERSIONS, check_version
-from .options import ForceOption, MachineOption, SetOption, TargetOption, UnitOption, WeightsOption
+from ..fmi.variables import FLAVOURS, FMI_VERSIONS
+from . import options
 
 if TYPE_CHECKING:
     from ..machines.machine import Machine
@@ -22,8 +22,8 @@ def build(
     fmus: Annotated[
         list[str] | None, typer.Argument(help="FMUs to build, by name; all of the machine's if left out.")
     ] = None,
-    machine: MachineOption = DEFAULT_MACHINE,
-    entries: SetOption = None,
+    machine: options.MachineOption = DEFAULT_MACHINE,
+    entries: options.SetOption = None,
     flavour: Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}.")] = FLAVOURS[0],
     fmi: Annotated[
         str,
@@ -31,13 +31,13 @@ def build(
             help=f"Version of FMI: {', '.join(FMI_VERSIONS)}; FMUs of FMI 3.0 are native, their names have Fmi3."
         ),
     ] = FMI_VERSIONS[0],
-    target: TargetOption = None,
-    weights: WeightsOption = None,
+    target: options.TargetOption = None,
+    weights: options.WeightsOption = None,
     trajectory: Annotated[
         Path | None,
         typer.Option(help="CSV, .npz or .mat file with the columns t and x_d, for ReferenceTrajectory to play."),
     ] = None,
-    unit: UnitOption = None,
+    unit: options.UnitOption = None,
     no_windows: Annotated[
         bool, typer.Option("--no-windows", help="Without a HybridPredictor's window, 4·Np scalars or four arrays.")
     ] = False,
@@ -57,7 +57,7 @@ def build(
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the archives.")] = Path("dist"),
-    force: ForceOption = False,
+    force: options.ForceOption = False,
 ) -> None:
     """Build FMUs from a machine file.
 
@@ -67,7 +67,7 @@ def build(
     from ..fmi.compile import default_targets, expanded, library_paths
     from ..fmi.controllers import CONFIGURATION_FILE, write_configuration
     from ..fmi.spec import table_of
-    from ..fmi.weights import load_trained
+    from ..fmi.weights import saved_weights
     from ..logs.log import check_reading
     from ..machines.machine import load_machine, machine_path
     from ..plants.trajectory import read_trajectory
@@ -89,7 +89,7 @@ def build(
     extras: dict[str, dict[str, Any]] = {}  # of some models
     if weights is not None:
         model = _one_of(models, "--weights", "HybridPredictor", "SepCompensator")
-        load_trained(weights, axis, model)  # before any file is written
+        saved_weights(weights, axis, model)  # before any file is written
         extras[model] = {"weights": weights, "embed_weights": embed_weights}
     elif embed_weights:
         raise ParameterError("--embed-weights needs --weights, which are compiled into the sources")
@@ -122,7 +122,6 @@ def _models(axis: "Machine", fmus: Sequence[str], flavour: str, targets: Sequenc
     from ..fmi.compile import check_available
     from ..fmi.spec import fmu_names
 
-    check_version(flavour, fmi)
     models = fmu_names(axis, flavour, fmi)
     if unknown := sorted(set(fmus) - set(models)):
         hint = ""
@@ -153,8 +152,8 @@ def hal(
     predictor: Annotated[
         bool, typer.Option("--predictor", help="The component that predicts alone; it needs no limits of the drive.")
     ] = False,
-    weights: WeightsOption = None,
-    force: ForceOption = False,
+    weights: options.WeightsOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Write the HAL component for LinuxCNC, and its axes.
 
@@ -165,7 +164,7 @@ def hal(
     """
     from ..base.files import atomic_open
     from ..fmi.controllers import COMPONENTS, axis_files, check_names, component_files
-    from ..fmi.weights import WEIGHTS_FILE, load_trained
+    from ..fmi.weights import WEIGHTS_FILE, saved_weights
     from ..machines.machine import load_machine
     from .console import check_outputs, warn_of_estimates
 
@@ -181,10 +180,10 @@ def hal(
             "--out must be a folder whose path has no blank, comma, quote, #, $, (, [ or backslash, at which loadrt "
             f"takes axes= apart, got {out.resolve()}"
         )
-    trained = None if weights is None else load_trained(weights, axes[0], model)
+    learned = saved_weights(weights, axes[0], model)
     files = {out / name: content for name, content in component_files(model).items()}
     for axis in axes:
-        files |= {out / axis.name / name: content for name, content in axis_files(axis, model, trained).items()}
+        files |= {out / axis.name / name: content for name, content in axis_files(axis, model, learned).items()}
     # of an earlier call: the axis would start with them
     stale = [path for axis in axes if (path := out / axis.name / WEIGHTS_FILE) not in files and path.is_file()]
     changed = [path for path, content in files.items() if not (path.is_file() and path.read_bytes() == content)]
@@ -209,8 +208,8 @@ def header(
     predictor: Annotated[
         bool, typer.Option("--predictor", help="Of the predictor alone; it needs no limits of the drive.")
     ] = False,
-    weights: WeightsOption = None,
-    force: ForceOption = False,
+    weights: options.WeightsOption = None,
+    force: options.ForceOption = False,
 ) -> None:
     """Write an axis as a C header for the library in C.
 
@@ -219,14 +218,13 @@ def header(
     """
     from ..base.files import atomic_open_text
     from ..fmi.controllers import axis_header
-    from ..fmi.weights import load_trained
+    from ..fmi.weights import saved_weights
     from ..machines.machine import load_machine, machine_path
     from .console import check_outputs, warn_of_estimates
 
     axis = load_machine(machine)
     model = "HybridPredictor" if predictor else "SepCompensator"
-    trained = None if weights is None else load_trained(weights, axis, model)
-    text = axis_header(axis, model, trained)
+    text = axis_header(axis, model, saved_weights(weights, axis, model))
     path = Path(f"{axis.name}.h") if out is None else out
     inputs = {f"machine file {machine}": machine_path(machine), "saved predictor": weights}
     check_outputs([("--out", path, (".h",))], inputs, force=force)

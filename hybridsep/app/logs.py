@@ -10,16 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..base.errors import LogError
-from .options import (
-    ForceOption,
-    JsonOption,
-    LogArgument,
-    MachineOption,
-    ReadingOptions,
-    SavedOption,
-    SetOption,
-    takes_reading,
-)
+from . import options
 
 if TYPE_CHECKING:
     from ..logs.checks import Finding
@@ -27,14 +18,23 @@ if TYPE_CHECKING:
     from ..machines.machine import Machine
 
 
-@takes_reading
+@options.takes_reading
 def backtest(
-    log: LogArgument,
-    machine: MachineOption,
-    entries: SetOption = None,
-    weights: SavedOption = None,
+    log: Annotated[
+        Path,
+        typer.Argument(
+            help="Recorded log with the columns t, x_d, x_meas or x, in a format of docs/reference/logs.md: "
+            "CSV, .mat, …"
+        ),
+    ],
+    machine: options.MachineOption,
+    entries: options.SetOption = None,
+    weights: Annotated[
+        Path | None,
+        typer.Option(help="A predictor saved with hybridsep backtest --save, to begin with what it learned."),
+    ] = None,
     *,
-    reading: ReadingOptions,
+    reading: options.ReadingOptions,
     report: Annotated[Path | None, typer.Option(help="HTML file about the replay, which needs no network.")] = None,
     figure: Annotated[
         Path | None, typer.Option(help="PNG, PDF or SVG with the errors of the predictions over time.")
@@ -46,8 +46,8 @@ def backtest(
             "predictions sample by sample (.csv, .npz); may be given for each."
         ),
     ] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.ForceOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Check a recorded log and replay it causally.
 
@@ -114,7 +114,7 @@ def backtest(
     print_written(report, figure, *saved)
 
 
-def read_checked(path: Path, reading: ReadingOptions, machine: Machine) -> tuple[Log, tuple[Finding, ...]]:
+def read_checked(path: Path, reading: options.ReadingOptions, machine: Machine) -> tuple[Log, tuple[Finding, ...]]:
     """Read a log of a machine and check it; what was found is shown.
 
     LogError if the log cannot be read, its columns mean something else, or a measurement misses without averaging;
@@ -123,16 +123,15 @@ def read_checked(path: Path, reading: ReadingOptions, machine: Machine) -> tuple
     import numpy as np
 
     from ..logs.checks import checked
-    from ..logs.log import read_log
-    from ..logs.remedies import Samples, whole_turns
+    from ..logs.log import read_log, whole_turns
     from ..machines.machine import check_interval, check_unit
 
     log = read_log(path, **reading.arguments(machine))
     check_unit(path.name, log, machine)
     log = replace(log, unit=machine.unit)
     if log.unit == "rad":  # where the file states none
-        turned, said = whole_turns(Samples(log.t, log.x_d, log.x_meas, log.T_s, log.starts))
-        log = replace(log, x_d=turned.x_d, x_meas=turned.x_meas, remarks=(*log.remarks, *([said] if said else [])))
+        log, said = whole_turns(log)
+        log = replace(log, remarks=(*log.remarks, *([said] if said else [])))
     check_interval(path.name, log.T_s, machine)
     if not machine.predictor_settings.averaging and np.isnan(log.x_meas).any():
         first = int(np.argmax(np.isnan(log.x_meas)))

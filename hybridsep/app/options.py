@@ -55,18 +55,6 @@ WeightsOption = Annotated[
         "here starts warm; name it where there are more."
     ),
 ]
-SavedOption = Annotated[
-    Path | None, typer.Option(help="A predictor saved with hybridsep backtest --save, to begin with what it learned.")
-]
-LogArgument = Annotated[
-    Path,
-    typer.Argument(
-        help="Recorded log with the columns t, x_d, x_meas or x, in a format of docs/reference/logs.md: CSV, .mat, …"
-    ),
-]
-LogsArgument = Annotated[
-    list[Path], typer.Argument(help="Recorded logs of one axis: commanded and measured positions.")
-]
 TrajectoryOption = Annotated[
     str | None,
     typer.Option(

@@ -1,12 +1,11 @@
 """Commands to begin with: the demonstration, an example log, and a machine file to edit."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .options import ForceOption
+from . import options
 
 _LAG = 0.006  # time constant of the axis in a machine file to edit, s
 
@@ -17,7 +16,7 @@ def demo(
         bool,
         typer.Option("--full", help="Ten noise seeds on the staircase, and the spiral's axes too; about a minute."),
     ] = False,
-    force: ForceOption = False,
+    force: options.ForceOption = False,
 ) -> None:
     """Co-simulate the paper's staircase, draw and score it.
 
@@ -37,12 +36,12 @@ def demo(
     console.print(f"\nPictures, tables, FMUs: {out / 'index.html'}{rest}", soft_wrap=True)
 
 
-def print_figures(summary: Mapping[str, Mapping[str, Any]]) -> None:
+def print_figures(summary: dict[str, dict[str, Any]]) -> None:
     """Print the tracking errors of the demo's compensated runs, then its prediction errors, within 80 columns."""
     from rich import box
     from rich.table import Table
 
-    from ..demo.page import compensation_table, prediction_table
+    from ..demo.cases import compensation_table, prediction_table
     from .console import console
 
     for found in (compensation_table(summary), prediction_table(summary)):
@@ -60,7 +59,7 @@ def print_figures(summary: Mapping[str, Mapping[str, Any]]) -> None:
 
 def example_log(
     out: Annotated[Path, typer.Option(help="File for the log, .csv or .csv.gz.")] = Path("example_axis.csv"),
-    force: ForceOption = False,
+    force: options.ForceOption = False,
 ) -> None:
     """Write the example log that comes with the library.
 
@@ -76,7 +75,7 @@ def example_log(
 
 def init(
     out: Annotated[Path, typer.Argument(help="Machine file to write.")] = Path("my_axis.toml"),
-    force: ForceOption = False,
+    force: options.ForceOption = False,
 ) -> None:
     """Write a machine file with comments, to edit.
 
@@ -85,8 +84,7 @@ def init(
     from ..base.files import atomic_open_text
     from ..identify.model import machine_of
     from ..identify.structure import lag_mode
-    from ..machines.machine import machine_name
-    from ..machines.text import machine_text
+    from ..machines.machine import machine_name, machine_text
     from ..model.physics import ModalModel
     from .console import check_outputs
 

@@ -44,11 +44,6 @@ class Parameter:
         unit = "" if self.unit == "1" else f" [{self.unit}]"
         return f"{self.description}{unit}" + ("" if self.kind is bool else f", {self.range_text}")
 
-    def allows(self, number: float) -> bool:
-        """Return whether a number is in the range."""
-        in_range = self.minimum <= number <= self.maximum and not 0 < abs(number) < self.nonzero
-        return in_range or number == self.automatic
-
     def checked(self, value: Any, label: str | None = None) -> Any:
         """Return a value, of a choice its name, in the parameter's type; ``label`` is its name in the message.
 
@@ -66,7 +61,8 @@ class Parameter:
         number = self._number(value, shown)
         if self.kind is int and number != int(number):
             raise ParameterError(f"{shown} must be a whole number, got {brief(value)}")
-        if not self.allows(number):
+        in_range = self.minimum <= number <= self.maximum and not 0 < abs(number) < self.nonzero
+        if not in_range and number != self.automatic:
             unit = "" if self.unit == "1" else f" {self.unit}"
             raise ParameterError(f"{shown} must be {self.range_text}{unit}, got {brief(value)}")
         return self.kind(number)

@@ -140,13 +140,8 @@ class PredictorSettings(Settings):
         1e-3, 1e-5, 1.0, "s", "sampling interval of command and measurement", display_unit="ms", learned=True
     )
     t_init: float = real(
-        *(
-            -1.0,
-            0.0,
-            1e6,
-            "s",
-            "warm-up: until then the prediction x_h is the physics-based x_pb, while learning goes on",
-        ),
+        *(-1.0, 0.0, 1e6, "s"),
+        "warm-up: until then the prediction x_h is the physics-based x_pb, while learning goes on",
         automatic=-1.0,
     )
     input_hold: str = choice(
@@ -180,9 +175,7 @@ class PredictorSettings(Settings):
         learned=True,
     )
     recall: int = whole(
-        8192,
-        0,
-        1_000_000,
+        *(8192, 0, 1_000_000),
         "samples that are remembered, to predict a repeated motion by what was measured then, with averaging; 0: none",
     )
     measurement_delay: int = whole(
@@ -272,7 +265,7 @@ class CompensatorSettings(Settings):
     ``averaging`` follow the friction and may turn. ``change_max``, None for no bound, is about twice the servo error
     without compensation: hybrid plans that ask for far more pause
     (:func:`~hybridsep.compensate.planning.runs_away`); ``following_error_max`` about 1.3 times the largest one
-    (:class:`~hybridsep.online.monitor.Monitor`). With ``averaging`` a hybrid plan of motion more than 1.25 times as
+    (:class:`~hybridsep.online.look_ahead.Monitor`). With ``averaging`` a hybrid plan of motion more than 1.25 times as
     fast as what was learned changes the command by at most half of ``change_max``, and so does the physics model's,
     unless weights of earlier runs judge it.
     """
@@ -339,16 +332,9 @@ class CompensatorSettings(Settings):
     def for_window(self, Np: int, look_ahead: int) -> "CompensatorSettings":
         """Return these settings for windows of ``Np`` samples, defaults filled in.
 
-        Parameters
-        ----------
-        Np : int
-        look_ahead : int
-            Samples that the drive needs, for a ``preview`` that is left out.
+        A ``preview`` that is left out follows from ``look_ahead``, the samples that the drive needs.
 
-        Raises
-        ------
-        ParameterError
-            If ``preview`` or ``spacing`` does not fit ``Np``.
+        ParameterError if ``preview`` or ``spacing`` does not fit ``Np``.
         """
         spacing, preview = self.spacing, self.preview
         if spacing is None:

@@ -25,8 +25,7 @@ from ..base.settings import CompensatorSettings, PredictorSettings, samples_befo
 from ..base.signals import as_measured, as_published, as_samples
 from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..base.threads import one_blas_thread
-from ..online.look_ahead import LookAhead, PublishedWindow, SepState
-from ..online.monitor import Monitor
+from ..online.look_ahead import LookAhead, Monitor, PublishedWindow, SepState
 from ..predict.averaging.features import Disturbance
 from ..predict.predictor import HybridPredictor
 from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview

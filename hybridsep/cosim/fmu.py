@@ -122,6 +122,9 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     Instances may live in several threads, each used by one thread at a time: they are loaded one after the other and
     step in parallel. While one is loaded, the working directory of the process is another for some milliseconds.
 
+    FmuError if the archive cannot be read, is no FMI 2.0 or 3.0 co-simulation FMU, has no library for this platform, or
+    refuses to be instantiated. A library's code runs in this process, and a damaged one may end it.
+
     Parameters
     ----------
     path : str or Path
@@ -136,12 +139,6 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         fmpy's variables by name.
     log : list of (status, message)
         Messages of the FMU's logger; at most the last 1000.
-
-    Raises
-    ------
-    FmuError
-        If the archive cannot be read, is no FMI 2.0 or 3.0 co-simulation FMU, has no library for this platform, or
-        refuses to be instantiated. A library's code runs in this process, and a damaged one may end it.
     """
 
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
@@ -162,7 +159,6 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             raise
 
     def _load(self, archive: Path, folder: Path, instance_name: str) -> None:
-        """Unpack the archive, load its library and make the instance."""
         identifier, version = self.description.coSimulation.modelIdentifier, self._version
         place = f"binaries/{version.platform}/{identifier}{fmpy.sharedLibraryExtension}"
         try:
@@ -178,11 +174,9 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
                     modelIdentifier=identifier,
                     instanceName=instance_name,
                 )
-        except OSError as error:
-            if error.filename is not None:  # the disk's, with a name
-                raise
-            raise FmuError(f"{self.path.name} cannot be loaded: {first_line(error)}") from error
         except Exception as error:  # fmpy raises bare Exceptions here
+            if isinstance(error, OSError) and error.filename is not None:  # the disk's, with a name
+                raise
             raise FmuError(f"{self.path.name} cannot be loaded: {first_line(error)}") from error
         try:
             _instantiate(slave, version, self.log)
@@ -194,13 +188,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
 
     @property
     def slave(self) -> Any:
-        """The instance as fmpy's slave, for FMI calls that have no method here.
-
-        Raises
-        ------
-        FmuError
-            If the instance is closed.
-        """
+        """The instance as fmpy's slave, for FMI calls that have no method here; FmuError if it is closed."""
         if self._release is None or not self._release.alive:
             raise FmuError(f"{self.path.name}: the instance is closed; make a new FmuInstance")
         return self._slave
@@ -216,10 +204,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def initialise(self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0) -> None:
         """Set parameters and start values and run through the initialization.
 
-        Raises
-        ------
-        FmuError
-            If the FMU refuses; its own message is part of the error.
+        FmuError if the FMU refuses; its own message is part of the error.
         """
         self.begin(values, start_time=start_time)
         self.finish()
@@ -277,7 +262,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             call()
             do_step(t, h)
 
-        return partial(self._call_open, step)
+        return partial(self._call, step)
 
     def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
         """Return a function that gets these variables in one FMI call for each type, an array's one after the other."""
@@ -294,7 +279,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             values = [value for _, buffer in prepared for value in buffer]
             return [values[place] for place in places]
 
-        return partial(self._call_open, read)
+        return partial(self._call, read)
 
     def step(self, t: float, h: float) -> None:
         """Do one communication step from ``t`` by ``h`` seconds."""
@@ -346,12 +331,9 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def _call_state(self, verb: str, *arguments: Any) -> Any:
         return self._call(getattr(self.slave, f"{verb}{self._version.state}"), *arguments)
 
-    def _call_open(self, function: Callable[..., Any], *arguments: Any) -> Any:
+    def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         """Call a function that was made for this instance, if it is still open."""
         _ = self.slave
-        return self._call(function, *arguments)
-
-    def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         try:
             return function(*arguments, **keywords)
         except (FMICallException, OSError) as error:  # on Windows ctypes raises OSError where others have a signal

@@ -9,19 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base import metrics
 from ..base.files import atomic_open, atomic_open_text
-from ..base.metrics import (
-    Score,
-    batch_rms,
-    hold,
-    html_table,
-    in_unit,
-    largest,
-    line_plot,
-    one_line,
-    peak_derivatives,
-    rms,
-)
 from ..base.signals import Array
 from ..online.look_ahead import SepState
 
@@ -113,10 +102,10 @@ class Run:
     unit: str = "m"
 
     def __repr__(self) -> str:
-        return one_line("Run", self._figures())
+        return metrics.one_line("Run", self._figures())
 
     def _repr_html_(self) -> str:
-        return html_table(f"Run of a {self.kind.name}", self._figures())
+        return metrics.html_table(f"Run of a {self.kind.name}", self._figures())
 
     def plot(self) -> "Figure":
         """Return a matplotlib figure over time, µm: errors of the predictions, or the tracking error and the change."""
@@ -124,12 +113,12 @@ class Run:
             lines = {"physics model": self.x_meas - self.x_pb, "hybrid": self.x_meas - self.x_h}
         else:
             lines = {"tracking error": self.error, "change of the command": self.change}
-        return line_plot(self.t, {name: 1e6 * line for name, line in lines.items()}, "t [s]", f"[µ{self.unit}]")
+        return metrics.line_plot(self.t, {name: 1e6 * line for name, line in lines.items()}, "t [s]", f"[µ{self.unit}]")
 
     def _figures(self) -> dict[str, float | int]:
         summary = self.summary()
         names = ("rms_pb_um", "rms_hold_um", "rms_h_um", "tracking_rms_um", "tracking_max_um", "change_max_um")
-        return in_unit({name: summary[name] for name in ("n_samples", *names) if name in summary}, self.unit)
+        return metrics.in_unit({name: summary[name] for name in ("n_samples", *names) if name in summary}, self.unit)
 
     @property
     def active(self) -> NDArray[np.bool_]:
@@ -139,7 +128,7 @@ class Run:
     @property
     def x_hold(self) -> Array:
         """Hold baseline, ``(n,)``, m."""
-        return hold(self.x_pb, self.x_meas, self.active, self.Np, late=max(0, self.measurement_delay))
+        return metrics.hold(self.x_pb, self.x_meas, self.active, self.Np, late=max(0, self.measurement_delay))
 
     @property
     def change(self) -> Array:
@@ -154,7 +143,7 @@ class Run:
     @property
     def tracking_rms(self) -> float:
         """RMS of the tracking error of the true position, m."""
-        return rms(self.error)
+        return metrics.rms(self.error)
 
     def summary(self) -> dict[str, float | int]:
         """Return the figures of the run's kind: prediction errors, or tracking errors."""
@@ -163,32 +152,26 @@ class Run:
     def prediction_figures(self) -> dict[str, float | int]:
         """Return RMS and largest errors, µm, over the whole trajectory, of the measured position unless named true."""
         return {
-            **Score.of(self.x_meas - np.stack((self.x_pb, self.x_hold, self.x_h))).figures(),
-            "rms_pb_true_um": 1e6 * rms(self.x - self.x_pb),
-            "rms_h_true_um": 1e6 * rms(self.x - self.x_h),
-            "servo_error_rms_um": 1e6 * rms(self.error),
+            **metrics.Score.of(self.x_meas - np.stack((self.x_pb, self.x_hold, self.x_h))).figures(),
+            "rms_pb_true_um": 1e6 * metrics.rms(self.x - self.x_pb),
+            "rms_h_true_um": 1e6 * metrics.rms(self.x - self.x_h),
+            "servo_error_rms_um": 1e6 * metrics.rms(self.error),
             "n_samples": len(self.t),
         }
 
     def tracking_figures(self) -> dict[str, float | int]:
         """Return tracking errors, change of the command and shares of the models over the whole trajectory.
 
-        Returns
-        -------
-        dict
-            RMS and largest magnitude in µm of the tracking error, against the true position and (``_measured_``) the
-            measured one, and of the command's change; the largest velocity, acceleration and jerk of ``x_dm``, of its
-            differences; the share of the samples that each model planned, 0 … 1.
+        These are RMS and largest magnitude in µm of the tracking error, against the true position and (``_measured_``)
+        the measured one, and of the command's change; the largest velocity, acceleration and jerk of ``x_dm``, of its
+        differences; the share of the samples that each model planned, 0 … 1.
         """
         figures: dict[str, float | int] = {}
-        for name, signal in (
-            ("tracking", self.error),
-            ("tracking_measured", self.x_d - self.x_meas),
-            ("change", self.change),
-        ):
-            figures[f"{name}_rms_um"] = 1e6 * rms(signal)
-            figures[f"{name}_max_um"] = 1e6 * largest(signal)
-        peaks = peak_derivatives(self.x_dm, self.T_s)
+        signals = {"tracking": self.error, "tracking_measured": self.x_d - self.x_meas, "change": self.change}
+        for name, signal in signals.items():
+            figures[f"{name}_rms_um"] = 1e6 * metrics.rms(signal)
+            figures[f"{name}_max_um"] = 1e6 * metrics.largest(signal)
+        peaks = metrics.peak_derivatives(self.x_dm, self.T_s)
         for name, peak in zip(("velocity_m_s", "acceleration_m_s2", "jerk_m_s3"), peaks, strict=True):
             figures[f"peak_{name}"] = peak
         figures |= {f"share_{one.name.lower()}": float(np.mean(self.state == one)) for one in SepState}
@@ -196,15 +179,14 @@ class Run:
 
     def batch_rms(self) -> dict[str, Array]:
         """Return the RMS errors of each window, m, ``(n_batches,)``, of ``x_pb``, ``x_hold`` and ``x_h``."""
-        return {name: batch_rms(self.x_meas - getattr(self, name), self.Np) for name in ("x_pb", "x_hold", "x_h")}
+        return {
+            name: metrics.batch_rms(self.x_meas - getattr(self, name), self.Np) for name in ("x_pb", "x_hold", "x_h")
+        }
 
     def save(self, path: str | Path) -> None:
         """Write the columns of the run's kind to ``path``: ``.csv`` with one row a sample, or ``.npz``.
 
-        Raises
-        ------
-        ValueError
-            If the suffix is another one.
+        ValueError if the suffix is another one.
         """
         save_columns({name: getattr(self, name) for name in self.kind.columns}, path)
 

@@ -103,7 +103,6 @@ def _of_orders(R: Array, n_rows: int) -> list[StateSpace]:
 
 
 def _misfit(model: StateSpace, records: Sequence[tuple[Array, Array]], Np: int) -> float:
-    """Return the sum of squares of the errors over windows."""
     total = 0.0
     with np.errstate(all="ignore"):
         for u, y in records:

@@ -152,7 +152,6 @@ def _cause(ratios: Sequence[float], change: float, largest: float, later: Array 
 
 
 def _not_learned(n_rejected: int, n_missing: int, n_samples: int) -> str:
-    """Return how many measurements were not learned, and why."""
     n_implausible = n_rejected - n_missing
     if n_missing and n_implausible:
         return (

@@ -27,8 +27,7 @@ from ..logs.checks import Finding, checked
 from ..logs.controller import controller_of
 from ..logs.log import Log, Table, read_log
 from ..logs.units import si_factor
-from ..machines.machine import Machine, checked_name
-from ..machines.text import machine_text
+from ..machines.machine import Machine, checked_name, machine_text
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction

@@ -9,17 +9,17 @@ import shlex
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError
 from ..base.files import atomic_open
-from ..fmi import native, python
 from ..machines.machine import Machine
+from . import native, python
 from .compile import ALL_TARGETS, default_targets, expanded
-from .flavours import FLAVOURS, FMI_VERSIONS
 from .spec import FmuSpec, fmu_name, fmu_names
+from .variables import FLAVOURS, FMI_VERSIONS
+from .weights import saved_weights
 
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
@@ -41,7 +41,7 @@ def build_fmu(
     windows: bool = True,
     embed_weights: bool = False,
 ) -> Path:
-    """Build one FMU.
+    """Build one FMU; return its path, ``out/name.fmu``.
 
     Parameters
     ----------
@@ -68,11 +68,6 @@ def build_fmu(
     embed_weights : bool
         Whether a native FMU's sources have the weights compiled in, for targets without files.
 
-    Returns
-    -------
-    Path
-        ``out/name.fmu``.
-
     Raises
     ------
     FmuError
@@ -97,13 +92,8 @@ def build_fmu(
         raise FmuError("embed_weights is for a native FMU with weights")
     path = Path(out) / f"{name}.fmu"
     with atomic_open(path) as file:
-        trained = None
-        if weights is not None:
-            from .weights import load_trained  # which loads slowly
-
-            trained = load_trained(weights, machine, model)
-        more: dict[str, Any] = {"samples": samples, "trained": trained, "windows": windows}
-        spec = FmuSpec.of(machine, model, flavour=flavour, fmi=fmi, **more)
+        learned = saved_weights(weights, machine, model)
+        spec = FmuSpec.of(machine, model, flavour=flavour, fmi=fmi, samples=samples, weights=learned, windows=windows)
         if flavour == "native":
             files = native.files(spec, targets=targets, embed_weights=embed_weights)
         else:

@@ -24,8 +24,7 @@ from pathlib import Path
 
 from ..base.files import data_folder
 from ..base.parameters import angular_unit
-from .flavours import FMI_VERSIONS
-from .variables import INTERPOLATED, FmuTable, Value, Variable
+from .variables import FMI_VERSIONS, INTERPOLATED, FmuTable, Value, Variable
 
 _MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}
 _ANY: Mapping[str, Value] = defaultdict(lambda: 1)
@@ -95,6 +94,8 @@ def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: by
     starts = ",\n".join(
         f"    {start!r} /* {variable.name} */" for start, variable in zip(layout.starts, layout.started, strict=True)
     )
+    said = "/* What was learned before, weights.bin: no file is needed for a warm start. */\n"
+    learned = f"{said}{c_bytes('hsep_embedded_weights', weights)}\n\n" if weights else ""
     text = f"""/* What fmi{fmi}Functions.h may put before the names of the FMI functions. */
 #ifndef FMI{fmi}_FUNCTION_PREFIX
 #define FMI{fmi}_FUNCTION_PREFIX {table.name}_
@@ -110,7 +111,7 @@ def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: by
 static const double hsep_starts[HSEP_N_STARTS] = {{
 {starts}}};
 
-{_weights(weights)}static const hsep_context hsep_table = {{
+{learned}static const hsep_context hsep_table = {{
     .variables = hsep_variables,
     .n_scalars = HSEP_N_SCALARS,
     .n_modes = HSEP_N_MODES,
@@ -189,12 +190,6 @@ static const hsep_variable hsep_variables[{len(rows)}] = {{
 
 
 _EMBEDDED = ",\n    .weights = hsep_embedded_weights,\n    .weights_size = sizeof hsep_embedded_weights"
-
-
-def _weights(content: bytes | None) -> str:
-    """Return the definition of the weights' bytes; empty if there are none."""
-    said = "/* What was learned before, weights.bin: no file is needed for a warm start. */\n"
-    return f"{said}{c_bytes('hsep_embedded_weights', content)}\n\n" if content else ""
 
 
 def c_bytes(name: str, content: bytes) -> str:

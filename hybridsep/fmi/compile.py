@@ -30,7 +30,7 @@ from tempfile import TemporaryDirectory
 from ..base.errors import FmuError
 from ..base.files import atomic_open, data_folder, named_errors
 from .c_header import KINDS, c_sources, fmi_headers, kind_header
-from .flavours import FMI_VERSIONS
+from .variables import FMI_VERSIONS
 
 ZIG = "ziglang 0.17.1"  # the compiler of the libraries in the wheel, which pyproject.toml pins as a build requirement
 
@@ -299,7 +299,6 @@ def _cache() -> Path:
 
 
 def _forget_old_versions() -> None:
-    """Remove the libraries of all but the latest versions."""
     versions = sorted(_cache().iterdir(), key=lambda folder: folder.stat().st_mtime, reverse=True)
     for folder in versions[_KEPT_VERSIONS:]:
         shutil.rmtree(folder, ignore_errors=True)

@@ -13,19 +13,16 @@ there stands in an XML file of the form of its ``CustomFMU.xml``, which it finds
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..base.errors import ParameterError
 from ..base.files import atomic_open_text, data_folder
 from ..base.version import __version__
 from ..machines.machine import Machine
 from .c_header import TABLE_FILE, c_bytes, c_sources, kind_header, table_file
-from .pages import filled
+from .description import filled
 from .spec import content_guid, table_of
 from .variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
-
-if TYPE_CHECKING:
-    from ..predict.predictor import HybridPredictor
+from .weights import WEIGHTS_FILE
 
 COMPONENTS = {"SepCompensator": "hsep", "HybridPredictor": "hsep_predictor"}  # name of the component of each model
 
@@ -58,27 +55,23 @@ def component_files(model: str) -> dict[str, bytes]:
     }
 
 
-def axis_files(machine: Machine, model: str, trained: "HybridPredictor | None" = None) -> dict[str, bytes]:
-    """Return the files of an axis' folder, with what an earlier run has learned: name → content.
+def axis_files(machine: Machine, model: str, weights: bytes | None = None) -> dict[str, bytes]:
+    """Return the files of an axis' folder, with the weights file of an earlier run: name → content.
 
     MachineError if a compensator is asked for a machine without limits of its drive.
     """
     if model == "SepCompensator":
         machine.check_section("drive_limits", ", or write a predictor's (--predictor)")
-    table = table_of(machine, model, machine.name, warm=trained is not None)
-    files: dict[str, bytes] = {}
-    if trained is not None:
-        from .weights import WEIGHTS_FILE, weights_file
-
-        files[WEIGHTS_FILE] = weights_file(trained)
+    table = table_of(machine, model, machine.name, warm=weights is not None)
+    files = {} if weights is None else {WEIGHTS_FILE: weights}
     return {TABLE_FILE: table_file(table, content_guid(files, table)), **files}
 
 
 _PARTS = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
 
 
-def axis_header(machine: Machine, model: str, trained: "HybridPredictor | None" = None) -> str:
-    """Return the header's text, with what was learned; MachineError if a compensator has no limits of its drive."""
+def axis_header(machine: Machine, model: str, weights: bytes | None = None) -> str:
+    """Return the header's text, with a weights file; MachineError if a compensator has no limits of its drive."""
     compensates = model == "SepCompensator"
     if compensates:
         machine.check_section("drive_limits", ", or write a predictor's (--predictor)")
@@ -97,22 +90,20 @@ def axis_header(machine: Machine, model: str, trained: "HybridPredictor | None" 
         name=name,
         kind="compensator" if compensates else "predictor",
         modes="\n".join(modes),
-        weights=_weights(name, trained),
+        weights=_weights(name, weights),
         settings="\n".join(settings),
         n_modes=len(modes),
     )
 
 
-def _weights(name: str, trained: "HybridPredictor | None") -> str:
+def _weights(name: str, content: bytes | None) -> str:
     """Return the lines that declare the weights: none, or the content of a weights file."""
     size = f"static const size_t {name}_weights_size ="
-    if trained is None:
+    if content is None:
         none = f"static const void *const {name}_weights = NULL;"
         return f"/* Nothing was learned before: it starts cold. */\n{none}\n{size} 0;"
-    from .weights import weights_file
-
-    content = c_bytes(f"{name}_weights", weights_file(trained))
-    return f"/* What an earlier run has learned. */\n{content}\n{size} sizeof {name}_weights;"
+    learned = c_bytes(f"{name}_weights", content)
+    return f"/* What an earlier run has learned. */\n{learned}\n{size} sizeof {name}_weights;"
 
 
 CONFIGURATION_FILE = "CustomFMU_hybridsep.xml"

@@ -19,11 +19,21 @@ from ..base.version import __version__
 from ..plants.trajectory import spiral, staircase
 from .c_header import FMI_HEADERS, TABLE_FILE, c_header, c_sources, fmi_headers, table_file
 from .compile import default_targets, libraries, placed
-from .description import ICON_FILE, TERMINALS_FILE, build_description, model_description, terminals_and_icons
-from .flavours import FMI_VERSIONS
-from .pages import compile_note, documentation, filled, icon
+from .description import (
+    ICON_FILE,
+    TERMINALS_FILE,
+    build_description,
+    compile_note,
+    documentation,
+    filled,
+    icon,
+    model_description,
+    terminals_and_icons,
+)
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
+from .variables import FMI_VERSIONS
+from .weights import WEIGHTS_FILE
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 
@@ -41,17 +51,14 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
         content["model.png"] = icon(model)
     if model == "ReferenceTrajectory":
         content |= {f"resources/{file}": data for file, data in _trajectories(spec.machine.T_s, spec.samples).items()}
-    weights = None
-    if spec.trained is not None:
-        from .weights import WEIGHTS_FILE, weights_file
-
-        weights = content[f"resources/{WEIGHTS_FILE}"] = weights_file(spec.trained)
+    if spec.weights is not None:
+        content[f"resources/{WEIGHTS_FILE}"] = spec.weights
     reference = reference_run(spec)
     dependencies = filled("native_dependencies.txt")
     content |= documentation(spec, needs, dependencies, reference, sources=compile_note(name, fmi))
     guid = content_guid(content, table)
     content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
-    content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, weights if embed_weights else None).encode()
+    content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, spec.weights if embed_weights else None).encode()
     content["sources/buildDescription.xml"] = build_description(name, fmi)
     content["modelDescription.xml"] = model_description(spec, guid, f"hybridsep {__version__}")
     content |= reference

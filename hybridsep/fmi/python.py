@@ -15,10 +15,10 @@ import pythonfmu
 
 from ..base.files import data_folder
 from ..base.version import __version__
-from .description import model_description
-from .pages import documentation, filled, icon
+from .description import documentation, filled, icon, model_description
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
+from .weights import WEIGHTS_FILE
 
 _SLAVES = {"HybridPredictor": "hybrid_predictor", "FeedDrive": "feed_drive"}
 
@@ -31,10 +31,8 @@ def files(spec: FmuSpec) -> dict[str, bytes]:
     model, name = spec.table.model, spec.table.name
     version = metadata.version("pythonfmu")  # 0.7, whose reference counting the slave balances
     content = _resources(model)
-    if spec.trained is not None:
-        from .weights import WEIGHTS_FILE, weights_file
-
-        content[f"resources/{WEIGHTS_FILE}"] = weights_file(spec.trained)
+    if spec.weights is not None:
+        content[f"resources/{WEIGHTS_FILE}"] = spec.weights
     needs = "The FMU needs a Python 3 with NumPy and SciPy in the importing tool's process."
     limits = filled("pythonfmu_limits.html", version=version).rstrip("\n")
     content["model.png"] = icon(model)

@@ -14,12 +14,14 @@ import numpy as np
 
 from ..base.settings import CompensatorSettings, PredictorSettings, samples_before
 from ..base.threads import one_blas_thread
+from ..compensate.compensator import SepCompensator
 from ..machines.machine import Machine
 from ..online.look_ahead import LookAhead
 from ..plants.plant import Encoder
 from ..plants.trajectory import staircase
 from ..predict.predictor import HybridPredictor
 from .spec import FmuSpec
+from .weights import restore_weights
 
 REFERENCE_FOLDER = "documentation/reference"
 
@@ -98,14 +100,10 @@ def _look_ahead_rows(spec: FmuSpec) -> Rows:
     machine, parameters, names = spec.machine, spec.table.parameters, list(spec.table.named("output"))
     settings = PredictorSettings.from_fmi(parameters)
     predictor, compensates = HybridPredictor(machine.model, settings), "x_dm" in names
-    if spec.trained is not None:
-        from .weights import restore_weights, weights_file
-
-        restore_weights(predictor, weights_file(spec.trained))
-    model: Any = predictor
+    if spec.weights is not None:
+        restore_weights(predictor, spec.weights)
+    model: HybridPredictor | SepCompensator = predictor
     if compensates:
-        from ..compensate.compensator import SepCompensator
-
         model = SepCompensator(predictor, CompensatorSettings.from_fmi(parameters))
     look_ahead = LookAhead(model, spec.table.rest, unit=machine.unit)
     warm_up = max(samples_before(settings.warm_up, machine.T_s), int(parameters.get("preview", 0)))

@@ -5,7 +5,7 @@ import json
 import uuid
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -17,27 +17,31 @@ from ..machines.machine import PAPER_SETTINGS, Machine
 from ..machines.sections import FeedDriveSection, IdentifiedSection
 from ..model.physics import ModalModel
 from ..plants.trajectory import staircase
-from .flavours import FLAVOURS, FMI_VERSIONS, check_version
-from .variables import SAMPLES_TRAJECTORY, FmuTable
+from .variables import FLAVOURS, FMI_VERSIONS, SAMPLES_TRAJECTORY, FmuTable
 
-if TYPE_CHECKING:
-    from ..predict.predictor import HybridPredictor
+AUTHOR = "the hybridsep authors"
+COPYRIGHT = f"Copyright (c) 2026, {AUTHOR}"  # the line of LICENSE
+
+_TITLES = {
+    "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
+    "SepCompensator": "servo error pre-compensation: modifies the command so that the drive follows it",
+    "FeedDrive": "nonlinear feed drive with encoder noise",
+    "ReferenceTrajectory": "Source of commands: plays the paper's staircase and spirals, or given samples",
+}
 
 _SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
 
 
 @dataclass(frozen=True, eq=False)
 class FmuSpec:
-    """A machine on its way into an archive: names, table, title and default experiment, resolved once."""
+    """A machine on its way into an archive."""
 
     machine: Machine
     table: FmuTable  # model, model identifier, start values and variables
     flavour: str  # {"native", "python"}
     fmi: str  # {"2", "3"}: version of FMI
-    title: str  # description of the FMU
-    stop_time: float  # s: end of the default experiment
     samples: Array | None = None  # (n,), m: trajectory 3 of a ReferenceTrajectory
-    trained: "HybridPredictor | None" = None  # with which a HybridPredictor or SepCompensator starts warm
+    weights: bytes | None = None  # weights file with which a HybridPredictor or SepCompensator starts warm
 
     @classmethod
     def of(
@@ -48,7 +52,7 @@ class FmuSpec:
         flavour: str = FLAVOURS[0],
         fmi: str = FMI_VERSIONS[0],
         samples: ArrayLike | None = None,
-        trained: "HybridPredictor | None" = None,
+        weights: bytes | None = None,
         windows: bool = True,
         rest: float = 0.0,
     ) -> "FmuSpec":
@@ -61,9 +65,37 @@ class FmuSpec:
         if played is not None:
             as_samples(played[:1], "samples", 1)
         name, built_in = fmu_name(model, machine.name, flavour, fmi), {"samples": played is not None}
-        table = table_of(machine, model, name, **built_in, warm=trained is not None, windows=windows, rest=rest)
-        title, end = _title(machine, model), _stop_time(machine, table, played)
-        return cls(machine, table, flavour, fmi, title, end, played, trained)
+        table = table_of(machine, model, name, **built_in, warm=weights is not None, windows=windows, rest=rest)
+        return cls(machine, table, flavour, fmi, played, weights)
+
+    @property
+    def title(self) -> str:
+        """Description, with a predictor's settings of the paper; ReferenceTrajectory's is every machine's."""
+        machine, model = self.machine, self.table.model
+        if model == "ReferenceTrajectory":
+            return _TITLES[model]
+        title = f"{machine.title}: {_TITLES[model]}"
+        if model != "HybridPredictor" or machine.name not in PAPER_SETTINGS:
+            return title
+        settings = ", ".join(f"{name} = {json.dumps(value)}" for name, value in PAPER_SETTINGS[machine.name].items())
+        return f"{title}; the paper's settings are {settings}"
+
+    @property
+    def stop_time(self) -> float:
+        """End of the default experiment, s: of the samples, or of the machine's trajectory, after the look-ahead.
+
+        With ``[limits]`` the trajectory is the staircase within them; without it is 10 s.
+        """
+        machine = self.machine
+        if self.samples is not None:
+            n = len(self.samples)
+        elif machine.limits is not None:
+            n = len(staircase(machine.T_s, limits=machine.trajectory_limits()))
+        else:
+            return 10.0
+        # A compensator delays by its preview, everything else runs beside a predictor.
+        delay = int(self.table.parameters.get("preview", machine.predictor_settings.Np))
+        return round((n - 1 + delay) * machine.T_s, 9)
 
 
 def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
@@ -73,10 +105,7 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSI
     ``ReferenceTrajectory`` plays the paper's trajectories for every machine; it comes with the default one. Of the
     Python flavour are predictors and drives.
 
-    Raises
-    ------
-    FmuError
-        If the flavour is unknown, or has no FMUs of this version of FMI.
+    FmuError if the flavour is unknown, or has no FMUs of this version of FMI.
     """
     models = ["HybridPredictor"]
     if machine.drive_limits is not None and flavour == "native":
@@ -92,7 +121,10 @@ def fmu_name(model: str, machine: str, flavour: str = FLAVOURS[0], fmi: str = FM
     """Return the archive stem of a model of the machine with a name; FmuError as :func:`fmu_names`."""
     if flavour not in FLAVOURS:
         raise FmuError(f"flavour must be one of {', '.join(FLAVOURS)}, got {flavour!r}")
-    check_version(flavour, fmi)
+    if fmi not in FMI_VERSIONS:
+        raise FmuError(f"the version of FMI must be one of {', '.join(FMI_VERSIONS)}, got {fmi!r}")
+    if flavour == "python" and fmi != "2":
+        raise FmuError(f"FMUs of the Python flavour are of FMI 2 alone, as pythonfmu's are, got FMI {fmi}")
     return f"{model}{_SUFFIX[flavour, fmi]}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
 
 
@@ -145,28 +177,6 @@ def _modes(model: ModalModel) -> tuple[dict[str, float], ...]:
     return tuple(asdict(mode) for mode in model.modes)
 
 
-AUTHOR = "the hybridsep authors"
-COPYRIGHT = f"Copyright (c) 2026, {AUTHOR}"  # the line of LICENSE
-
-_TITLES = {
-    "HybridPredictor": "linear hybrid model: predicts the drive's position one look-ahead window early",
-    "SepCompensator": "servo error pre-compensation: modifies the command so that the drive follows it",
-    "FeedDrive": "nonlinear feed drive with encoder noise",
-    "ReferenceTrajectory": "Source of commands: plays the paper's staircase and spirals, or given samples",
-}
-
-
-def _title(machine: Machine, model: str) -> str:
-    """Return the title, with a predictor's settings of the paper; ReferenceTrajectory's is every machine's."""
-    if model == "ReferenceTrajectory":
-        return _TITLES[model]
-    title = f"{machine.title}: {_TITLES[model]}"
-    if model != "HybridPredictor" or machine.name not in PAPER_SETTINGS:
-        return title
-    settings = ", ".join(f"{name} = {json.dumps(value)}" for name, value in PAPER_SETTINGS[machine.name].items())
-    return f"{title}; the paper's settings are {settings}"
-
-
 def content_guid(files: Mapping[str, bytes], table: FmuTable) -> str:
     """Return a GUID that follows from table and files (archive name → content), and from nothing else.
 
@@ -176,22 +186,3 @@ def content_guid(files: Mapping[str, bytes], table: FmuTable) -> str:
     for arcname in sorted(files):
         digest.update(arcname.encode() + hashlib.sha256(files[arcname]).digest())
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
-
-
-_WITHOUT_TRAJECTORY = 10.0  # s
-
-
-def _stop_time(machine: Machine, table: FmuTable, samples: Array | None) -> float:
-    """Return the end of the samples, or of the machine's trajectory, with the look-ahead's delay, s.
-
-    With ``[limits]`` the trajectory is the staircase within them; without it is 10 s.
-    """
-    if samples is not None:
-        n = len(samples)
-    elif machine.limits is not None:
-        n = len(staircase(machine.T_s, limits=machine.trajectory_limits()))
-    else:
-        return _WITHOUT_TRAJECTORY
-    # A compensator delays by its preview, everything else runs beside a predictor.
-    delay = int(table.parameters.get("preview", machine.predictor_settings.Np))
-    return round((n - 1 + delay) * machine.T_s, 9)

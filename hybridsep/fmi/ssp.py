@@ -16,13 +16,13 @@ from ..base.errors import FmuError
 from ..base.files import atomic_open
 from ..base.signals import as_samples
 from ..base.version import __version__
-from ..fmi import native
 from ..machines.machine import Machine
+from . import native
 from .archive import archived
 from .description import described_variables, document, unit_elements
-from .flavours import FMI_VERSIONS
 from .spec import FmuSpec
-from .variables import Variable
+from .variables import FMI_VERSIONS, Variable
+from .weights import saved_weights
 
 SSP_VERSIONS = ("1", "2")  # SSP 1.0 with FMI 2.0 FMUs, SSP 2.0 with FMI 3.0 FMUs; the default first
 
@@ -188,15 +188,11 @@ def build_system(
     components: list[_Component] = []
     for i, (part, kind) in enumerate(parts.items()):
         progress(kind, i / len(parts))
-        trained = None
-        if weights is not None and part == look_ahead:
-            from .weights import load_trained  # which loads slowly
-
-            trained = load_trained(weights, machine, kind)
+        learned = saved_weights(weights, machine, kind) if part == look_ahead else None
         played = samples if part == "reference" else None
         # windows are no connectors, and thousands of errors of one importer's
         rest = float(samples[0])
-        spec = FmuSpec.of(machine, kind, fmi=fmi, samples=played, trained=trained, windows=False, rest=rest)
+        spec = FmuSpec.of(machine, kind, fmi=fmi, samples=played, weights=learned, windows=False, rest=rest)
         name = spec.table.name
         content[f"resources/{name}.fmu"] = archived(native.files(spec, targets=targets))
         scalars = [variable for variable, size in described_variables(spec.table, spec.fmi) if size is None]

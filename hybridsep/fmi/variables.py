@@ -14,7 +14,12 @@ from typing import Any
 from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 
+FLAVOURS = ("native", "python")  # of FMUs; the default first
+FMI_VERSIONS = ("2", "3")  # FMI 2.0 and FMI 3.0; the default first
+
 Value = float | int | bool  # a start value
+
+MODE = ("f_n", "zeta", "alpha", "beta")  # numbers of a mode of eq. (15)
 
 _PREDICTOR = PredictorSettings.fmi_parameters()
 
@@ -34,6 +39,7 @@ _REJECTED = "measurements that were missing or not plausible, with averaging; co
 _NO_MEASUREMENT = (
     "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
 )
+_STD = "standard deviation of x_meas - x_h, now; 0: not known"
 _ALARM = "whether the compensator has tripped: x_meas - x_d was above following_error_max for three samples in a row"
 # no input: several masters set all inputs by setReal
 _RESET = "a rising edge ends a trip; what was learned before it stays"
@@ -146,7 +152,7 @@ def _modes(modes: Sequence[Mapping[str, float]]) -> list[Variable]:
     return [
         _parameter(PARAMETERS[name], mode[name], group="Physics model", label=f"mode[{i}].{name}")
         for i, mode in enumerate(modes, start=1)
-        for name in ("f_n", "zeta", "alpha", "beta")
+        for name in MODE
     ]
 
 
@@ -154,11 +160,7 @@ def modes_from(values: Mapping[str, Value]) -> list[dict[str, float]]:
     """Return the modes of the variables ``mode[i].*``; ParameterError, with its place, if one is out of its range."""
     n = sum(name.endswith(".f_n") for name in values)
     return [
-        {
-            key: check(key, values[f"mode[{i}].{key}"], label=f"mode[{i}].{key}")
-            for key in ("f_n", "zeta", "alpha", "beta")
-        }
-        for i in range(1, n + 1)
+        {key: check(key, values[f"mode[{i}].{key}"], label=f"mode[{i}].{key}") for key in MODE} for i in range(1, n + 1)
     ]
 
 
@@ -173,7 +175,7 @@ def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
             "x_pb", "output", "physics-based prediction for now, made when the window began", initially_from=ahead
         ),
         _position("x_h", "output", "hybrid prediction for now, made when the window began", initially_from=ahead),
-        _position("x_h_std", "output", "standard deviation of x_meas - x_h, now; 0: not known", display_unit="um"),
+        _position("x_h_std", "output", _STD, display_unit="um"),
         _position("e_servo", "output", "predicted servo error x_d - x_h", display_unit="um"),
         Variable("hybrid_active", "Boolean", "output", "discrete", "whether x_h is the hybrid prediction now"),
         *_RUNNING_ERRORS,
@@ -182,12 +184,9 @@ def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mappin
     ]
     table += _look_ahead_parameters(parameters)
     table += _modes(modes)
-    for name, meaning in (
-        ("x_d", "commanded positions"),
-        ("x_pb", "physics-based predictions"),
-        ("x_h", "hybrid predictions"),
-    ):
-        meaning = f"{meaning} of the current window"
+    shown = {"x_d": "commanded positions", "x_pb": "physics-based predictions", "x_h": "hybrid predictions"}
+    for name, what in shown.items():
+        meaning = f"{what} of the current window"
         table += [_position(f"{name}_window[{i}]", "local", meaning, initially_from=ahead) for i in window]
     spread = "standard deviations of x_meas - x_h in the current window"
     table += [_position(f"x_h_std_window[{i}]", "local", spread, display_unit="um") for i in window]
@@ -198,6 +197,9 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
     ahead = ("x_d_ahead",)
     # With weights from an earlier run and no warm-up, the hybrid model may plan the first window already.
     model = ("t_init", "compensate", "averaging")
+    plan = (*ahead, *model)
+    prediction = "prediction for now under x_dm, with averaging by its model, else by the model that planned the window"
+    error = "predicted servo error x_d - x_h that is left"
     state = "model that planned what x_dm follows now"
     return [
         _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
@@ -205,26 +207,9 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
         _position("x_dm", "output", "modified command now; wire it to the drive", initially_from=ahead),
         _position("x_d", "output", "commanded position now: x_d_ahead, preview samples later", initially_from=ahead),
         _position("x_pb", "output", "physics-based prediction for now under x_dm", initially_from=ahead),
-        _position(
-            "x_h",
-            "output",
-            "prediction for now under x_dm, with averaging by its model, else by the model that planned the window",
-            initially_from=(*ahead, *model),
-        ),
-        _position(
-            "x_h_std",
-            "output",
-            "standard deviation of x_meas - x_h, now; 0: not known",
-            display_unit="um",
-            initially_from=(*ahead, *model, "lambda", "noise_std"),
-        ),
-        _position(
-            "e_servo",
-            "output",
-            "predicted servo error x_d - x_h that is left",
-            display_unit="um",
-            initially_from=(*ahead, *model),
-        ),
+        _position("x_h", "output", prediction, initially_from=plan),
+        _position("x_h_std", "output", _STD, display_unit="um", initially_from=(*plan, "lambda", "noise_std")),
+        _position("e_servo", "output", error, display_unit="um", initially_from=plan),
         Variable(
             "sep_state",
             "Enumeration",
@@ -273,13 +258,12 @@ def _plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[st
     ]
 
 
-def _trajectory_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
+def _trajectory_variables(parameters: Mapping[str, Value], _modes: Sequence[Mapping[str, float]]) -> list[Variable]:
     """Return the table of the ReferenceTrajectory, which has no modes."""
     meaning = "commanded position at t; wire it to x_d_ahead"
     return [
         _position("r", "output", meaning, initially_from=("trajectory",)),
         *(_parameter(PARAMETERS[name], parameters[name], group="Trajectory") for name in ("trajectory", "T_s")),
-        *_modes(modes),
     ]
 
 

@@ -23,6 +23,7 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.regression import RidgeRegression
 from ..predict.uncertainty import Uncertainty
+from .variables import MODE
 
 if TYPE_CHECKING:  # as this module is packed, and machines are not
     from ..machines.machine import Machine
@@ -32,7 +33,6 @@ _MAGIC = b"HSEPWG14"
 _HEAD = struct.Struct("<8s3Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")
-_MODE = ("f_n", "zeta", "alpha", "beta")
 _DAMAGED = f"{WEIGHTS_FILE} is damaged, truncated or from another version; train again"
 
 
@@ -43,7 +43,7 @@ def _learned_settings(settings: PredictorSettings, model: ModalModel) -> dict[st
     values: dict[str, float] = {name: numbers[name] for name in learned}
     values["dead_time"] = model.dead_time
     for i, mode in enumerate(model.modes, start=1):
-        values |= {f"mode[{i}].{name}": getattr(mode, name) for name in _MODE}
+        values |= {f"mode[{i}].{name}": getattr(mode, name) for name in MODE}
     return values
 
 
@@ -118,16 +118,16 @@ def _differences(name: str, then: float, now: float) -> list[str]:
 
 
 def warm_predictor(machine: "Machine", weights: str | Path | None) -> HybridPredictor:
-    """Return a machine's predictor, with what a saved one has learned, if given; StateError as :func:`load_trained`."""
+    """Return a machine's predictor, with what a saved one has learned; StateError as :func:`saved_weights`."""
     if weights is None:
         return machine.new_predictor()
-    predictor = load_trained(weights, machine, "HybridPredictor")
+    predictor = _load_trained(weights, machine, "HybridPredictor")
     predictor.restart()
     return predictor
 
 
-def load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPredictor:
-    """Return the predictor that :meth:`HybridPredictor.save` wrote.
+def saved_weights(path: str | Path | None, machine: "Machine", kind: str) -> bytes | None:
+    """Return the file's content for the predictor that :meth:`HybridPredictor.save` wrote; None without one.
 
     It must have been trained for the machine: with its ``input_hold``, modes, and all settings on which weights depend
     (:func:`_learned_settings`), its predictor's or compensator's as ``kind`` says. Its window may be another one:
@@ -136,6 +136,10 @@ def load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPredi
     StateError if the file is not a saved predictor, one of another machine, naming all that differs, or has learned
     nothing.
     """
+    return None if path is None else weights_file(_load_trained(path, machine, kind))
+
+
+def _load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPredictor:
     path = Path(path)
     try:
         trained = HybridPredictor.load(path)

@@ -85,7 +85,6 @@ class _GivenSource(ArraysSource):
         self.stamps = frozenset(name for name, one in self._given.items() if one.values.dtype.kind in "mM")
 
     def column(self, name: str) -> Array:
-        """Return a column's values."""
         if name in self._refused:
             raise self._refused[name]
         values = self._given[name].values
@@ -100,9 +99,6 @@ class TableSource(_GivenSource):
 
     An index of times is the time, unless a column is called so; one of numbers tells where rows are missing.
     """
-
-    format = "columns in memory"
-    endings = ()
 
     def __init__(self, table: Any) -> None:
         if callable(getattr(type(table), "collect", None)):  # polars' LazyFrame
@@ -136,11 +132,6 @@ class TableSource(_GivenSource):
         self._given[name] = Given(labels)
         self.names, self.roles = [*self.names, name], {"t": name}
         self._find_stamps()
-
-    @staticmethod
-    def recognises(head: bytes) -> bool:
-        """Return False: it is no file."""
-        return False
 
 
 def _columns_of(table: Any) -> dict[str, Any]:

@@ -18,8 +18,7 @@ from scipy.optimize import nnls
 from ..base.errors import LogError
 from ..base.signals import Array, Indices
 from ..base.threads import one_blas_thread
-from .log import Log
-from .remedies import uneven
+from .log import Log, uneven
 from .units import POSITION_UNITS, UNIT_OPTIONS
 
 _SAMPLES_MIN = 100  # samples below which nothing can be learned and judged: a window of the default length

@@ -10,8 +10,7 @@ import numpy as np
 from ..base.errors import LogError, brief, listed
 from .names import ROLES, axes_of, known_names, signals_of
 from .source import Block, Source, sample_number
-from .text import is_number
-from .timestamps import stamp_kind
+from .text import is_number, stamp_kind
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
 _COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "pulse", "pulses")

@@ -10,9 +10,8 @@ from pathlib import Path
 from ..base.errors import LogError
 from ..base.files import atomic_open
 from .arrays import MatSource, NpzSource, ParquetSource
-from .capture import CaptureSource
 from .halscope import HalscopeSource
-from .sinumerik import SinumerikSource
+from .sinumerik import CaptureSource, SinumerikSource
 from .source import Source
 from .text import TextSource
 from .twincat import TwinCatSource

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.errors import LogError, brief
 from ..base.signals import Array
@@ -36,9 +35,8 @@ class Source(ABC):
     def __init__(self, path: Path) -> None:
         self.path = path
         self.names: list[str] = []  # available columns
-        self.twins: Mapping[
-            str, Sequence[str]
-        ] = {}  # further columns of the same name, under names of their own, Time#2
+        # further columns of the same name, under names of their own, Time#2
+        self.twins: Mapping[str, Sequence[str]] = {}
         self.units: Mapping[str, str] = {}  # units that the file states, where it does so outside the name
         self.assumed_units: Mapping[str, str] = {}  # units by the format's convention, which a given one overrides
         self.roles: Mapping[str, str] = {}  # "t", "x_d", "x" → the column that the format itself has for it
@@ -51,9 +49,9 @@ class Source(ABC):
         self.commanded, self.measured = "", ""
 
     @staticmethod
-    @abstractmethod
     def recognises(head: bytes) -> bool:
         """Return whether a file that begins with these bytes, 4 kB if it has as many, is of this format."""
+        return False  # of what is no file
 
     @abstractmethod
     def read(self, names: Sequence[str]) -> Block:
@@ -89,8 +87,3 @@ def past_midnights(times: Array, day: float) -> Array:
 def sample_number(i: int) -> str:
     """Return the location, for messages, of sample ``i`` of a log."""
     return f"sample {i + 1} (the first is 1)"
-
-
-def line_number(numbers: Sequence[int] | NDArray[np.int64]) -> Callable[[int], str]:
-    """Return the location, for messages, of samples in a block whose lines have these numbers."""
-    return lambda i: f"line {numbers[i]}"

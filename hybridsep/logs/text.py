@@ -24,8 +24,7 @@ import numpy as np
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .names import n_known
-from .source import Block, Source, line_number, past_midnights
-from .timestamps import SECOND, nanoseconds, stamp_kind
+from .source import Block, Source, past_midnights
 from .units import plain_name, position_unit, time_unit
 
 _HEAD_LINES = 1000  # lines, blank ones aside, in which names and numbers must begin
@@ -43,6 +42,28 @@ _MISSING = re.compile(r"[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?
 
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
 _NOT_THOUSANDS = re.compile(r",(?!\d{3}(?!\d))")
+
+_SECOND = 1_000_000_000  # in nanoseconds, which doubles count exactly over a day
+
+_ONE_DATE = r"""
+    \d{4} [-/.] \d{1,2} [-/.] \d{1,2}                       # 2026-03-05
+    | \d{8}                                                 # 20260305, before a time of day
+    | \d{1,2} [-/.] \d{1,2} [-/.] (?: \d{4} | \d{2} )       # 05.03.2026, 3/5/26
+    | \d{1,2} [-\ ] [A-Za-z]{3} [-\ ] \d{4}                 # 05-Mar-2026
+"""
+
+_DATE = re.compile(rf"[\s'\"]* (?: {_ONE_DATE} ) [\s'\"]*", re.VERBOSE)
+
+_STAMP = re.compile(
+    rf"""[\s'"]*
+    (?P<date> (?: {_ONE_DATE} ) (?: [Tt_-] | [.,]?\s+ ) )?
+    (?P<hour>[01]?\d|2[0-3]) : (?P<minute>[0-5]\d) : (?P<second>[0-5]\d) (?: [.,] (?P<fraction>\d{{1,9}}) )?
+    (?: \s* (?P<half>[AaPp]) \.? [Mm] \.? )?
+    (?: \s* (?: [Zz] | UTC | GMT | (?:UTC|GMT)? [+-] \d\d (?: :? \d\d )? ) )?
+    [\s'"]*""",
+    re.VERBOSE,
+)
+"""A time of day, with a date before it and a zone after it or without."""
 
 _GZIP = b"\x1f\x8b"
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
@@ -118,11 +139,11 @@ class TextSource(Source):
             raise LogError(f"{self.path}: is truncated or damaged after line {line}: {first_line(error)}") from error
         columns = dict(zip(names, np.concatenate(parts).T if parts else np.empty((len(names), 0)), strict=True))
         for name in self.stamps & columns.keys():
-            since = past_midnights(columns[name], 86_400.0 * SECOND)
-            columns[name] = (since - since[:1]) / SECOND
+            since = past_midnights(columns[name], 86_400.0 * _SECOND)
+            columns[name] = (since - since[:1]) / _SECOND
         if self.commanded in columns:
             columns[self.commanded] = self._filled(columns[self.commanded], numbers)
-        return Block([np.ascontiguousarray(columns[name]) for name in names], line_number(numbers))
+        return Block([np.ascontiguousarray(columns[name]) for name in names], lambda i: f"line {numbers[i]}")
 
     def _filled(self, column: Array, numbers: Sequence[int]) -> Array:
         """Return the command with what is blank as before, which is noted."""
@@ -182,7 +203,7 @@ class TextSource(Source):
                         f"{self.path}, line {number}: {expected} columns were expected as in line "
                         f"{self._table.header}, got {len(fields)}; correct the line, or take it out"
                     )
-        stamps = dict.fromkeys(self._table.clocks.intersection(use), nanoseconds)
+        stamps = dict.fromkeys(self._table.clocks.intersection(use), _nanoseconds)
         try:
             how: Any = {"converters": stamps, "comments": None, "quotechar": '"', "ndmin": 2, "encoding": None}
             return np.loadtxt(lines, np.float64, delimiter=mark, usecols=use, **how)
@@ -200,7 +221,7 @@ class TextSource(Source):
             may_miss = name in (self.measured, *self.twins.get(self.measured, ()))
             try:
                 if i in self._table.clocks:
-                    row.append(nanoseconds(field))
+                    row.append(_nanoseconds(field))
                 elif may_miss and (not field or _MISSING.fullmatch(field)):
                     row.append(math.nan)
                 elif not field and name == self.commanded:
@@ -251,6 +272,24 @@ def is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def stamp_kind(text: str) -> str:
+    """Return whether a text is a ``"date"``, a ``"time"`` of day or a ``"date and time"``; empty if it is neither."""
+    match = _STAMP.fullmatch(text)
+    if match:
+        return "date and time" if match["date"] else "time"
+    return "date" if _DATE.fullmatch(text) else ""
+
+
+def _nanoseconds(text: str) -> float:
+    """Return the time of day of a timestamp, ns; ValueError if it is none."""
+    match = _STAMP.fullmatch(text)
+    if match is None:
+        raise ValueError(text)
+    _, hour, minute, second, fraction, half = match.groups()
+    hours = int(hour) if half is None else int(hour) % 12 + 12 * (half in "Pp")
+    return float((3600 * hours + 60 * int(minute) + int(second)) * _SECOND + int((fraction or "").ljust(9, "0")))
 
 
 def decimal_points(text: str) -> str:

@@ -46,11 +46,6 @@ class Times:
     remarks: tuple[str, ...] = ()  # what was unwrapped, and why segments begin
 
 
-def given_times(n: int, T_s: float) -> Times:
-    """Return the times of ``n`` samples of a given interval, s."""
-    return Times(np.arange(n, dtype=np.float64) * T_s, T_s)
-
-
 @np.errstate(over="ignore", invalid="ignore")  # times may be any finite numbers
 def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated: bool, given: float | None) -> Times:
     """Return what a column of times tells.
@@ -135,9 +130,9 @@ def _rows(path: Path, name: str, t: Array, given: float | None, remarks: tuple[s
     scale = given / mean
     beyond = (scale * steps > scale * resolution + _GAP * given) | (steps < -2.0 * resolution)
     starts = np.flatnonzero(beyond) + 1
-    found = given_times(len(t), given)
     said = f"the times are rounded coarsely: the rows are taken {given:g} s apart"
-    return Times(found.t, given, (0, *starts.tolist()), (*remarks, said, *_words(scale * t, starts, given)))
+    even = np.arange(len(t), dtype=np.float64) * given
+    return Times(even, given, (0, *starts.tolist()), (*remarks, said, *_words(scale * t, starts, given)))
 
 
 def _unknown_unit(path: Path, name: str, first: float, interval: float, *, counts: bool) -> LogError:

@@ -14,33 +14,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ..base.errors import MachineError, ParameterError, brief, first_line, listed
 from ..base.files import data_folder
+from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, Cascade, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..model.physics import ModalModel, Mode
 from ..plants.feed_drive import FeedDrive
-from ..plants.plant import Drive
 from ..plants.stage_drive import StageDrive
-from .sections import (
-    COMPENSATOR,
-    NAME_PATTERN,
-    PREDICTOR,
-    DriveLimitsSection,
-    FeedDriveSection,
-    IdentifiedSection,
-    LimitsSection,
-    LogSection,
-    Physics,
-    PlantSection,
-    Section,
-    StageSection,
-    choice_entry,
-    line_entry,
-    lines_entry,
-    name_entry,
-    parameter_entry,
-    plant_entry,
-    read_section,
-    section_entry,
-)
+from .sections import NAME_PATTERN, FeedDriveSection, FileSection, IdentifiedSection, StageSection, read_section
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -53,6 +32,8 @@ if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs none
     from ..predict.predictor import HybridPredictor
 
 
+_COLUMN = 32  # column of the comments, for alignment
+
 _NEEDED = {
     "plant": "which hybridsep fit writes from a log of the axis",
     "limits": "of its trajectory; add them",
@@ -62,24 +43,11 @@ _NEEDED = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Machine(Section):
+class Machine(FileSection):
     """One axis: identification, physics model, settings, plant if it has one; ``unit`` rad: every m stands for rad.
 
     ``predictor`` and ``compensator`` are the entries that were given, by the names of the settings' fields.
     """
-
-    name: str = name_entry()
-    title: str = line_entry()
-    sources: tuple[str, ...] = lines_entry()
-    T_s: float = parameter_entry("T_s", PARAMETERS["T_s"].default)
-    unit: str = choice_entry("m", "rad", default="m")
-    physics: Physics = section_entry(Physics)
-    predictor: Mapping[str, Any] = PREDICTOR
-    compensator: Mapping[str, Any] = COMPENSATOR
-    plant: PlantSection | None = plant_entry()
-    limits: LimitsSection | None = section_entry(LimitsSection, None)
-    drive_limits: DriveLimitsSection | None = section_entry(DriveLimitsSection, None)
-    log: LogSection = section_entry(LogSection, LogSection())
 
     def __repr__(self) -> str:
         settings = self.predictor_settings
@@ -169,10 +137,7 @@ class Machine(Section):
     ) -> "Machine":
         """Return a copy with other entries of a section, by their names in the file; ``""``: of the file itself.
 
-        Raises
-        ------
-        ParameterError
-            If they are out of range or inconsistent.
+        ParameterError if they are out of range or inconsistent.
         """
         if section:
             values = {section: {**self.table.get(section, {}), **values}}
@@ -198,13 +163,10 @@ class Machine(Section):
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
         return SepCompensator(own, self._compensation() if settings is None else settings)
 
-    def new_plant(self, **changes: float | str) -> Drive:
+    def new_plant(self, **changes: float | str) -> FeedDrive | StageDrive:
         """Return the plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.
 
-        Raises
-        ------
-        MachineError
-            If the file has no ``[plant]``, as for a recorded axis.
+        MachineError if the file has no ``[plant]``, as for a recorded axis.
         """
         self.check_section("plant")
         assert self.plant is not None
@@ -291,17 +253,10 @@ def machine_path(machine: str | Path) -> Path:
 def load_machine(machine: str | Path, changes: Iterable[str] = ()) -> Machine:
     """Read a machine file.
 
-    Parameters
-    ----------
-    machine : str or Path
-        Path of a ``.toml`` file, or name of a bundled machine.
-    changes : iterable of str
-        Entries with other values than the file's, each as ``predictor.p=20``; a word needs no quotes.
+    ``machine``: path of a ``.toml`` file, or name of a bundled machine; ``changes``: entries with other values than the
+    file's, each as ``predictor.p=20``; a word needs no quotes.
 
-    Raises
-    ------
-    MachineError
-        If there is no such file, it is not TOML, or an entry is missing, unknown or out of range.
+    MachineError if there is no such file, it is not TOML, or an entry is missing, unknown or out of range.
     """
     path = machine_path(machine)
     try:
@@ -395,3 +350,50 @@ def paper_machine(name: str) -> Machine:
     if name not in PAPER_SETTINGS:
         raise MachineError(f"the paper's machines are {', '.join(PAPER_SETTINGS)}, got {name!r}")
     return load_machine(name).changed("predictor", PAPER_SETTINGS[name])
+
+
+# Writer ---------------------------------------------------------------------------------------------------------------
+
+
+def machine_text(machine: Machine, comments: Iterable[str] = (), *, annotated: bool = False) -> str:
+    """Return a machine file; :func:`load_machine` reads the same machine.
+
+    ``comments`` are lines at its head; if it is ``annotated``, each entry says what it is, besides its unit.
+    """
+    head = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
+    declared = {**PARAMETERS, **Limits.parameters()}
+    words = {name: _words(one, machine.unit == "rad", annotated) for name, one in declared.items()}
+    lines = _lines("", {**machine.table, "T_s": machine.T_s}, words, "")
+    return "\n".join([*head, *lines]).strip("\n") + "\n"
+
+
+def _lines(place: str, table: Mapping[str, Any], words: Mapping[str, str], heading: str) -> list[str]:
+    """Return the lines of a table's own entries below its heading, then of the tables in it."""
+    own, tables = [], []
+    for name, value in table.items():
+        inner = f"{place}.{name}" if place else name
+        if isinstance(value, Mapping):
+            tables += _lines(inner, value, words, f"[{inner}]")
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
+            tables += [line for item in value for line in _lines(inner, item, words, f"[[{inner}]]")]
+        else:
+            line, said = f"{name} = {_value(value)}", words.get(name, "")
+            own.append(f"{line:<{_COLUMN}}# {said}" if said and "\n" not in line else line)
+    return ["", heading, *own, *tables] if own and heading else [*own, *tables]
+
+
+def _words(parameter: Parameter, rotary: bool, annotated: bool) -> str:
+    """Return the unit of a parameter and, if it is annotated, its description."""
+    unit = (angular_unit(parameter.unit) or "") if rotary else parameter.unit
+    parts = [unit] if parameter.kind is float and unit != "1" else []
+    return ", ".join([*parts, *([parameter.description] if annotated else [])])
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, list | tuple):
+        return "[\n" + "".join(f"    {_value(item)},\n" for item in value) + "]" if value else "[]"
+    return '"' + str(value).replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -125,12 +125,6 @@ def _is_line(value: Any) -> bool:
     return isinstance(value, str) and _LINE.fullmatch(value) is not None
 
 
-def name_entry() -> Any:
-    """Declare the entry of a machine's name."""
-    what = "a letter, then at most 99 letters, digits and _"
-    return _text_entry(lambda value: isinstance(value, str) and bool(re.fullmatch(NAME_PATTERN, value)), what)
-
-
 def line_entry(default: Any = MISSING) -> Any:
     """Declare an entry of one line of text."""
     return _text_entry(_is_line, _LINE_WORDS, default)
@@ -347,8 +341,24 @@ def _own(settings: type[PredictorSettings | CompensatorSettings]) -> dict[str, P
     return {name: one for name, one in settings.parameters().items() if name not in settings.ELSEWHERE}
 
 
-PREDICTOR = _settings_entry(_own(PredictorSettings), lambda given: PredictorSettings(**given))
-"""Parameters of the hybrid predictor."""
+@dataclass(frozen=True, kw_only=True)
+class FileSection(Section):
+    """All entries of a machine file; what the section of the compensator leaves out is as the predictor's."""
 
-COMPENSATOR = _settings_entry({**_own(PredictorSettings), **_own(CompensatorSettings)}, lambda _given: None)
-"""Parameters of the compensator; the predictor's count where they are left out."""
+    name: str = _text_entry(
+        lambda value: isinstance(value, str) and bool(re.fullmatch(NAME_PATTERN, value)),
+        "a letter, then at most 99 letters, digits and _",
+    )
+    title: str = line_entry()
+    sources: tuple[str, ...] = lines_entry()
+    T_s: float = parameter_entry("T_s", PARAMETERS["T_s"].default)
+    unit: str = choice_entry("m", "rad", default="m")
+    physics: Physics = section_entry(Physics)
+    predictor: Mapping[str, Any] = _settings_entry(_own(PredictorSettings), lambda given: PredictorSettings(**given))
+    compensator: Mapping[str, Any] = _settings_entry(
+        {**_own(PredictorSettings), **_own(CompensatorSettings)}, lambda _given: None
+    )
+    plant: PlantSection | None = plant_entry()
+    limits: LimitsSection | None = section_entry(LimitsSection, None)
+    drive_limits: DriveLimitsSection | None = section_entry(DriveLimitsSection, None)
+    log: LogSection = section_entry(LogSection, LogSection())

@@ -35,7 +35,18 @@ class DiscreteModel:
         self.A, self.b, self.c, self.d = _discretised(state_space, self.T_s, input_hold)
         self._n = len(self.b)
         self._block = max(1, min(block, BLOCK_MAX))
-        self._tabulate()
+        # Lifted matrices for windows of up to ``block`` samples
+        m, n = self._block, self._n
+        self._powers = np.empty((m + 1, n, n))  # A⁰ … Aᵐ
+        self._powers[0] = np.eye(n)
+        for power, following in pairwise(self._powers):
+            self.A.dot(power, following)  # in a third of the time of @
+        self._O = np.ascontiguousarray(self.c @ self._powers[:m])  # row i: c Aⁱ
+        self._K = np.ascontiguousarray((self._powers[:m] @ self.b)[::-1].T)  # [Aᵐ⁻¹b … A b, b]
+        markov = np.concatenate(([self.d], self._O[: m - 1] @ self.b))  # d, c b, c A b, …
+        # Row i: markov[i], markov[i − 1], …, 0; SciPy's toeplitz takes ten times as long
+        lagged = sliding_window_view(np.concatenate((np.zeros(m - 1), markov)), m)
+        self._T = np.ascontiguousarray(lagged[:, ::-1])
 
     @property
     def n_state(self) -> int:
@@ -75,20 +86,6 @@ class DiscreteModel:
         n = len(u)
         x_pb = self._O[:n] @ s + self._T[:n, :n] @ u
         return x_pb, self._powers[n] @ s + self._K[:, self._block - n :] @ u
-
-    def _tabulate(self) -> None:
-        """Tabulate the lifted matrices for windows of up to ``block`` samples."""
-        m, n = self._block, self._n
-        self._powers = np.empty((m + 1, n, n))  # A⁰ … Aᵐ
-        self._powers[0] = np.eye(n)
-        for power, following in pairwise(self._powers):
-            self.A.dot(power, following)  # in a third of the time of @
-        self._O = np.ascontiguousarray(self.c @ self._powers[:m])  # row i: c Aⁱ
-        self._K = np.ascontiguousarray((self._powers[:m] @ self.b)[::-1].T)  # [Aᵐ⁻¹b … A b, b]
-        markov = np.concatenate(([self.d], self._O[: m - 1] @ self.b))  # d, c b, c A b, …
-        # Row i: markov[i], markov[i − 1], …, 0; SciPy's toeplitz takes ten times as long
-        lagged = sliding_window_view(np.concatenate((np.zeros(m - 1), markov)), m)
-        self._T = np.ascontiguousarray(lagged[:, ::-1])
 
 
 def _discretised(state_space: StateSpace, T_s: float, input_hold: str) -> tuple[Array, Array, Array, float]:

@@ -31,19 +31,10 @@ MODES_MAX = 100  # largest number of modes; the discrete model's tables grow wit
 class Mode:
     """One mode of eq. (15), ``(α + β s) / (s² + 2 ζ ω s + ω²)`` with ``ω = 2π f_n``.
 
-    Parameters
-    ----------
-    f_n : float
-        Natural frequency, Hz.
-    zeta : float
-        Damping ratio; 1 is critical, more is over-damped.
-    alpha, beta : float
-        Numerator, 1/s² and 1/s.
+    ``f_n``: natural frequency, Hz; ``zeta``: damping ratio, 1 is critical, more is over-damped; ``alpha``, ``beta``:
+    numerator, 1/s² and 1/s.
 
-    Raises
-    ------
-    ParameterError
-        If a value is not finite or out of range; ``zeta ≤ 0`` would be an unstable model.
+    ParameterError if a value is not finite or out of range; ``zeta ≤ 0`` would be an unstable model.
     """
 
     f_n: float
@@ -65,17 +56,9 @@ class Mode:
 class ModalModel:
     """Linear, causal, stable drive model: a sum of modes with input dead time, eq. (15).
 
-    Parameters
-    ----------
-    modes : sequence of Mode
-        1 … :data:`MODES_MAX`.
-    dead_time : int
-        Input delay, samples.
+    ``modes``: 1 … :data:`MODES_MAX`; ``dead_time``: input delay, samples.
 
-    Raises
-    ------
-    ParameterError
-        If there is no mode or too many, or ``dead_time`` is not a whole number ≥ 0.
+    ParameterError if there is no mode or too many, or ``dead_time`` is not a whole number ≥ 0.
     """
 
     modes: tuple[Mode, ...]
@@ -93,17 +76,9 @@ class ModalModel:
     def spring_mass_damper(cls, m: float, c: float, k: float, dead_time: int = 0) -> ModalModel:
         """Return eq. (11), ``G_pb(s) = (c s + k) / (m s² + c s + k)``, as one mode.
 
-        Parameters
-        ----------
-        m, c, k : float
-            Mass kg, damping N·s/m, stiffness N/m, all > 0.
-        dead_time : int
-            Whole samples of dead time.
+        ``m``, ``c``, ``k``: mass, kg, damping, N·s/m, and stiffness, N/m, all > 0; ``dead_time``: whole samples.
 
-        Raises
-        ------
-        ParameterError
-            If a value, or the resulting mode, is out of range.
+        ParameterError if a value, or the resulting mode, is out of range.
         """
         m, c, k = check("m", m), check("c", c), check("k", k)
         # ω² = k/m, 2ζω = c/m, α = k/m, β = c/m
@@ -133,18 +108,11 @@ class ModalModel:
 
         Complex pole pairs become under-damped modes, real poles are paired into over-damped ones.
 
-        Parameters
-        ----------
-        system : control.TransferFunction or control.StateSpace
-            Continuous, one input, one output, strictly proper, stable, no repeated mode.
-        dead_time : int
-            Whole samples of dead time to add.
+        ``system``: continuous, one input, one output, strictly proper, stable, no repeated mode; ``dead_time``: whole
+        samples of dead time to add.
 
-        Raises
-        ------
-        ModelError
-            If the system is of another kind, discrete, zero, not finite, improper or unstable, has several channels,
-            or has repeated modes.
+        ModelError if the system is of another kind, discrete, zero, not finite, improper or unstable, has several
+        channels, or has repeated modes.
         """
         return cls(_modes_of(system), dead_time)
 
@@ -160,10 +128,7 @@ class ModalModel:
         time included, first reaches 95 % of its end, or 1.5 periods of the lowest mode that swings, ζ < 1, and adds 5 %
         somewhere, and 0.2 s, which count as 100 samples at least, and 200 at most.
 
-        Parameters
-        ----------
-        T_s, input_hold
-            As of :meth:`discretise`.
+        ``T_s``, s, and ``input_hold`` are as of :meth:`discretise`.
         """
         discrete = self.discretise(T_s, input_hold)
         step, _ = discrete.forced_response(discrete.rest(), np.ones(_LOOK_AHEAD_MAX // 3))
@@ -182,13 +147,8 @@ class ModalModel:
     def state_space(self) -> tuple[Array, Array, Array]:
         """Return ``(A, b, c)`` of the modes, block diagonal, without the dead time.
 
-        Each mode has the states ``(ω² z, ω ż)`` with ``z̈ + 2ζω ż + ω² z = x_d``, both in metres.
-
-        Returns
-        -------
-        A : (2m, 2m) array, 1/s
-        b : (2m,) array, 1/s
-        c : (2m,) array, 1
+        Each mode has the states ``(ω² z, ω ż)`` with ``z̈ + 2ζω ż + ω² z = x_d``, both in metres: of ``m`` modes ``A``
+        is ``(2m, 2m)``, ``b`` ``(2m,)``, both in 1/s, and ``c`` ``(2m,)`` without a unit.
         """
         from scipy.linalg import block_diag
 
@@ -203,40 +163,18 @@ class ModalModel:
     def discretise(self, T_s: float, input_hold: str = "zoh", block: int = BLOCK_MAX) -> DiscreteModel:
         """Return the discrete-time model, exact at the samples under the hold.
 
-        Parameters
-        ----------
-        T_s : float
-            Sampling interval, s.
-        input_hold : {"zoh", "foh"}
-            Zero-order or first-order hold of ``x_d``.
-        block : int
-            Longest window computed in one piece, the size of the tables.
+        ``T_s``: sampling interval, s; ``input_hold``: zero-order or first-order hold of ``x_d``, "zoh" or "foh";
+        ``block``: longest window computed in one piece, the size of the tables.
 
-        Raises
-        ------
-        ParameterError
-            If ``T_s ≤ 0`` or the hold is unknown.
+        ParameterError if ``T_s ≤ 0`` or the hold is unknown.
         """
         return DiscreteModel(self.state_space(), self.dead_time, T_s, input_hold, block)
 
     def frequency_response(self, omega: ArrayLike, T_s: float | None = None) -> NDArray[np.complex128]:
-        """Return ``G_pb(j ω)``.
+        """Return ``G_pb(j ω)``, m/m, complex, in the shape of ``omega``, angular frequencies, rad/s.
 
-        Parameters
-        ----------
-        omega : array_like, rad/s
-            Angular frequencies, any shape.
-        T_s : float, optional
-            Sampling interval, s; needed when there is a dead time, which is counted in samples.
-
-        Returns
-        -------
-        array of complex, shape of ``omega``, m/m
-
-        Raises
-        ------
-        ParameterError
-            If there is a dead time and no ``T_s``.
+        ``T_s``, s, the sampling interval, is needed when there is a dead time, which is counted in samples:
+        ParameterError without.
         """
         if self.dead_time and T_s is None:
             raise ParameterError(f"T_s is needed: dead_time = {self.dead_time} is counted in samples")

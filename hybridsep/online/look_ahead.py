@@ -12,7 +12,7 @@ what is measured over the fill. ``t_init`` counts from the end of the fill.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
@@ -21,9 +21,11 @@ import numpy as np
 from ..base.errors import SignalError
 from ..base.settings import samples_before
 from ..base.signals import Array, check_position
-from ..base.state import arrays_of, pack, restored, restoring, unpack
+from ..base.state import FIXED, arrays_of, pack, restored, restoring, unpack
 from ..predict.predictor import HybridPredictor
-from .monitor import Monitor
+
+_N_OVER = 3
+"""Samples in a row above the limit that trip: one or two may be outliers of the sensor. Missing ones do not count."""
 
 
 class SepState(IntEnum):
@@ -60,8 +62,47 @@ class PublishedWindow:
         return cls(rest, rest, rest, rest, np.zeros(Np), 0, Np)
 
 
-class WindowPlanner(Protocol):
-    """Interface of what a look-ahead asks for its windows."""
+@dataclass
+class Monitor:
+    """Monitor of the following error, as drives have one, and of measurements that are missing: their counts."""
+
+    n_lost: int = field(default=0, metadata=FIXED)  # samples without a measurement after which it is lost; 0: never
+    error_max: float = field(default=0.0, metadata=FIXED)  # largest following error, m; 0: none
+    n_missing: int = 0  # measurements that were missing one after another
+    n_over: int = 0  # samples above ``error_max`` one after another, three from when it tripped on
+    n_taken: int = 0  # samples taken in since the window began
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether no measurement came for so long that the change of the command fades, until one comes."""
+        return 0 < self.n_lost <= self.n_missing
+
+    @property
+    def is_tripped(self) -> bool:
+        """Whether the change of the command fades until a reset."""
+        return self.n_over >= _N_OVER
+
+    def take_in(self, error: float) -> bool:
+        """Take in a sample's following error, measured position minus command as it came, m; NaN where missing.
+
+        Returns whether it is within the limit, and nothing has tripped: what is not is not learned.
+        """
+        self.n_taken += 1
+        if math.isnan(error):
+            self.n_missing += 1
+            return True
+        self.n_missing = 0
+        if not self.is_tripped:
+            self.n_over = self.n_over + 1 if abs(error) > self.error_max > 0.0 else 0
+        return self.n_over == 0
+
+    def reset(self) -> None:
+        """End a trip; what was learned before it is kept."""
+        self.n_over = 0
+
+
+class Planner(Protocol):
+    """Interface of a planner, which modifies the commands of a window before they are predicted; it can be saved."""
 
     predictor: HybridPredictor
     preview: int  # samples of a plan, at least ``Np``
@@ -76,10 +117,6 @@ class WindowPlanner(Protocol):
     def update(self, x: Array) -> None:
         """Learn from the positions measured over the planned window, ``(Np,)``, m."""
 
-
-class Planner(WindowPlanner, Protocol):
-    """Interface of a planner, which modifies the commands of a window before they are predicted; it can be saved."""
-
     def to_bytes(self) -> bytes:
         """Return parameters and state, the predictor's included."""
 
@@ -91,9 +128,7 @@ class Planner(WindowPlanner, Protocol):
 class _Unmodified:
     """Planner that sends the commands as they are, with a predictor's prediction of them.
 
-    The lead-in is one window, at rest, which is neither predicted nor learned.
-
-    ``at_rest``: whether the current window is the lead-in.
+    The lead-in is one window, at rest, which is neither predicted nor learned; ``at_rest`` says whether it is now.
     """
 
     def __init__(self, predictor: HybridPredictor, *, at_rest: bool) -> None:
@@ -101,19 +136,16 @@ class _Unmodified:
         self._at_rest = at_rest
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
-        """Begin another run behind the lead-in, at rest at ``start``, m; the warm-up ``t_init``, s, begins there."""
         self.predictor.restart(start, t_init=t_init)
         self._at_rest = lead_in > 0
 
     def plan(self, x_d: Array, load: Array) -> PublishedWindow:
-        """Predict the next window under the load, but for the lead-in; SignalError if the prediction diverges."""
         if self._at_rest:
             return PublishedWindow.at_rest(float(x_d[0]), self.preview)
         found = self.predictor.predict(x_d + load)
         return PublishedWindow(x_d, x_d, found.x_pb, found.x_h, found.x_h_std, 0, found.n_warm_up)
 
     def update(self, x: Array) -> None:
-        """Learn from the positions measured over a predicted window, ``(Np,)``, m."""
         if not self._at_rest:
             self.predictor.update(x)
         self._at_rest = False
@@ -124,6 +156,8 @@ _KIND = "look-ahead"
 
 class LookAhead:
     """Delay line of commands, with the position predicted ahead, and the commands modified by a planner.
+
+    SignalError if its ``start`` is not finite.
 
     Parameters
     ----------
@@ -143,17 +177,12 @@ class LookAhead:
     Np, delay : int
         Samples in a window; samples by which commands are delayed.
     model : HybridPredictor or Planner
-    planner : WindowPlanner
+    planner : Planner
         The model, or the predictor as the planner that changes nothing.
     window : PublishedWindow
         The window that ``k`` is part of.
     diverged : str
         Message of the window that diverged, after which every sample is refused; empty before.
-
-    Raises
-    ------
-    SignalError
-        If ``start`` is not finite.
     """
 
     diverged: str = ""
@@ -191,7 +220,7 @@ class LookAhead:
 
     def _hold(self, model: HybridPredictor | Planner, k: int) -> None:
         self.model = model
-        self.planner: WindowPlanner = (
+        self.planner: Planner | _Unmodified = (
             _Unmodified(model, at_rest=k < model.Np) if isinstance(model, HybridPredictor) else model
         )
         self.predictor = self.planner.predictor
@@ -287,21 +316,13 @@ class LookAhead:
     def sample(self, x_d_ahead: float, x_meas: float, x_load: float = 0.0) -> None:
         """Process sample ``k`` and advance to ``k + 1``.
 
-        Parameters
-        ----------
-        x_d_ahead : float, m
-            ``r(k)``, the command for ``delay`` samples later.
-        x_meas : float, m
-            ``x(k)``, the position measured now; with a ``measurement_delay`` of −1 ``x(k + 1)``.
-        x_load : float, m
-            Load for ``delay`` samples later, as :meth:`SepCompensator.plan
-            <hybridsep.compensate.compensator.SepCompensator.plan>` takes it; it counts from that of the first sample.
+        ``x_d_ahead``, m: ``r(k)``, the command for ``delay`` samples later; ``x_meas``, m: ``x(k)``, the position
+        measured now, with a ``measurement_delay`` of −1 ``x(k + 1)``; ``x_load``, m: load for ``delay`` samples later,
+        as :meth:`SepCompensator.plan <hybridsep.compensate.compensator.SepCompensator.plan>` takes it, which counts
+        from that of the first sample.
 
-        Raises
-        ------
-        SignalError
-            If one of them is not finite; nothing is changed then. If the window that begins diverges,
-            every later sample is refused, too.
+        SignalError if one of them is not finite; nothing is changed then. If the window that begins diverges, every
+        later sample is refused, too.
         """
         self.check(x_d_ahead, x_meas, x_load)
         if self.predictor.settings.measurement_delay < 0:
@@ -337,18 +358,9 @@ class LookAhead:
 
     @classmethod
     def from_bytes(cls, blob: bytes, model_type: type[HybridPredictor] | type[Planner]) -> "LookAhead":
-        """Return the look-ahead of :meth:`to_bytes`.
+        """Return the look-ahead of :meth:`to_bytes`, whose predictor or planner is of the type ``model_type``.
 
-        Parameters
-        ----------
-        blob : bytes
-        model_type : type
-            Type of the predictor or planner.
-
-        Raises
-        ------
-        StateError
-            If the blob is foreign, truncated or of another version.
+        StateError if the blob is foreign, truncated or of another version.
         """
         meta, arrays, parts = unpack(_KIND, blob)
         look_ahead = cls.__new__(cls)

@@ -41,38 +41,11 @@ class Plant(Protocol):
         """True position, m."""
 
 
-class Drive(Plant, Protocol):
-    """Interface of the library's drives: a plant with a velocity, whose state can be saved."""
-
-    @property
-    def v(self) -> float:
-        """True velocity, m/s."""
-
-    def state(self) -> list[float]:
-        """Return the state as plain numbers."""
-
-    def restore(self, state: list[float]) -> None:
-        """Restore a :meth:`state`."""
-
-
 def simulate(plant: Plant, x_d: ArrayLike, T_s: float, *, start: float | None = None) -> Array:
-    """Return the response of a plant to a command under a zero-order hold.
+    """Return the response of a plant, which is reset first, to a command under a zero-order hold.
 
-    Parameters
-    ----------
-    plant : Plant
-        Reset first.
-    x_d : (n,) array_like, m
-        Commanded positions.
-    T_s : float
-        Sampling interval, s.
-    start : float, optional
-        Initial position, m; the first command if left out.
-
-    Returns
-    -------
-    x : (n,) array, m
-        True positions ``x(k)``, before ``x_d(k)`` acts.
+    ``x_d``, (n,), m: commanded positions; ``T_s``: sampling interval, s; ``start``: initial position, m, the first
+    command if left out. Returns (n,), m: true positions ``x(k)``, before ``x_d(k)`` acts.
     """
     commands = as_samples(x_d, "x_d")
     if len(commands) == 0:
@@ -108,14 +81,7 @@ class Encoder:
     """Position sensor with Gaussian noise from a portable generator.
 
     SplitMix64 (Steele, Lea and Flood 2014) gives two uniform numbers per sample, the Box-Muller transform (1958) one
-    normal number.
-
-    Parameters
-    ----------
-    noise_std : float
-        Standard deviation, m, ≥ 0.
-    seed : int
-        0 … 2³¹ − 1.
+    normal number. ``noise_std``: standard deviation, m, ≥ 0; ``seed``: 0 … 2³¹ − 1.
     """
 
     def __init__(self, noise_std: float = 0.0, seed: int = 0) -> None:

@@ -39,7 +39,9 @@ def rest_to_rest(
     dwell: float = 0.0,
     duration: float | None = None,
 ) -> Array:
-    """Return a sequence of time-optimal, jerk-limited rest-to-rest moves.
+    """Return a sequence of time-optimal, jerk-limited rest-to-rest moves, ``(n,)``, m.
+
+    The samples are at ``0, T_s, …``, the last one at or after the end.
 
     Parameters
     ----------
@@ -55,11 +57,6 @@ def rest_to_rest(
         Rest between moves, s, when no start times are given.
     duration : float, optional
         Duration, s; to the end of the last move and its dwell if left out.
-
-    Returns
-    -------
-    x_d : (n,) array, m
-        Samples at ``0, T_s, …``, the last one at or after the end.
 
     Raises
     ------
@@ -124,10 +121,7 @@ def spiral(
 ) -> tuple[Array, Array]:
     """Return the commands of X and Y for the paper's spiral from the centre, 5 turns, 30 mm, eq. (14) along the path.
 
-    Returns
-    -------
-    x_d, y_d : (n,) arrays, m
-        5.9 s at the default values.
+    Each is ``(n,)``, m, 5.9 s at the default values.
     """
     position, derivative, end = archimedean_spiral(radius, turns)
     points = along_path(position, derivative, end, limits, T_s)

@@ -14,7 +14,7 @@ from places import ROOT
 
 from hybridsep.app import console
 from hybridsep.app.console import progress_bar
-from hybridsep.cosim.adapters import FmuDrive
+from hybridsep.cosim.loop import FmuDrive
 
 MACHINE = "spring_mass_damper"
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and devices")

@@ -16,7 +16,7 @@ from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
 from hybridsep.base.errors import ParameterError
-from hybridsep.cosim.adapters import FmuController
+from hybridsep.cosim.loop import FmuController
 from hybridsep.fitting.build import fit_files
 from hybridsep.fitting.fit import Fit, fit
 from hybridsep.fitting.replay import replay, split_log

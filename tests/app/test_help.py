@@ -20,7 +20,7 @@ from hybridsep.app import cli
 from hybridsep.app.cli import EXAMPLES
 from hybridsep.logs.checks import check
 from hybridsep.logs.formats import EXAMPLE
-from hybridsep.machines.text import machine_text
+from hybridsep.machines.machine import machine_text
 from hybridsep.plants.stage_drive import StageDrive
 
 

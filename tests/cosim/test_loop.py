@@ -12,9 +12,8 @@ from built_once import BuiltFmus
 from hybridsep import load_machine, paper_machine
 from hybridsep.base.errors import FmuError, ParameterError, SignalError
 from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
-from hybridsep.cosim.adapters import check_controller
 from hybridsep.cosim.fmu import FmuInstance
-from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.loop import check_controller, cosimulate
 from hybridsep.cosim.run import COMPENSATOR, PREDICTOR, ControllerType, Run
 from hybridsep.evaluate.backtest import backtest
 from hybridsep.plants.plant import Encoder, simulate

@@ -10,9 +10,8 @@ from hybridsep import Encoder, Limits, load_machine, machine_names, simulate, sp
 from hybridsep.base.errors import MachineError
 from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
 from hybridsep.compensate.compensator import RECOMMENDED
-from hybridsep.machines.machine import Machine, machine_from_table, machine_path
+from hybridsep.machines.machine import Machine, machine_from_table, machine_path, machine_text
 from hybridsep.machines.sections import Physics, SpringMassDamper, StageSection
-from hybridsep.machines.text import machine_text
 
 GOOD = """
 name = "axis"

@@ -25,7 +25,7 @@ from hybridsep.machines.machine import paper_machine
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.online.look_ahead import LookAhead
 from hybridsep.plants.feed_drive import FeedDrive
-from hybridsep.plants.plant import Drive, Encoder, simulate
+from hybridsep.plants.plant import Encoder, simulate
 from hybridsep.plants.stage_drive import StageDrive
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.predictor import HybridPredictor
@@ -214,7 +214,7 @@ class PlantStream(LibraryStream):
         self._x_meas = self._encoder.measure(self._plant.x)
 
     @staticmethod
-    def _made(values: Mapping[str, Any]) -> Drive:
+    def _made(values: Mapping[str, Any]) -> FeedDrive | StageDrive:
         """Return the stage where there are modes among the values, the nonlinear drive otherwise."""
         if not (modes := modes_from(values)):
             return FeedDrive(*(values[name] for name in ("m", "c", "k", "c_nl", "k_nl")))

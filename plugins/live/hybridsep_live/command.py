@@ -64,7 +64,7 @@ def live(
 
     from hybridsep import build_fmu, fmu_names, load_machine
     from hybridsep.base.errors import ParameterError
-    from hybridsep.cosim.adapters import FmuController, check_controller
+    from hybridsep.cosim.loop import FmuController, check_controller
     from hybridsep.cosim.run import PREDICTOR
     from hybridsep.logs.units import shown_of
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridsep.base.errors import FmuError, SignalError
-from hybridsep.cosim.adapters import FmuController
+from hybridsep.cosim.loop import FmuController
 
 from .sample import Sample
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from hybridsep.cosim.adapters import FmuController
+from hybridsep.cosim.loop import FmuController
 
 from .core import LiveCore, Row
 from .first_seconds import FirstSeconds

@@ -13,8 +13,7 @@ from staircase_data import commanded
 
 from hybridsep import backtest, load_machine
 from hybridsep.base.errors import FmuError, ParameterError, SignalError
-from hybridsep.cosim.adapters import FmuController
-from hybridsep.cosim.loop import cosimulate
+from hybridsep.cosim.loop import FmuController, cosimulate
 from hybridsep.cosim.run import Run
 from hybridsep.fmi.weights import warm_predictor
 from hybridsep.logs.log import read_log

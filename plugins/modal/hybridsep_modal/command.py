@@ -49,8 +49,7 @@ def modal(
     from hybridsep.app.console import progress_bar
     from hybridsep.base.errors import ParameterError
     from hybridsep.base.files import atomic_open_text
-    from hybridsep.machines.machine import checked_name, machine_name
-    from hybridsep.machines.text import machine_text
+    from hybridsep.machines.machine import checked_name, machine_name, machine_text
 
     from .figure import response_figure
 
