@@ -115,13 +115,10 @@ HSEP_API hsep_instance *hsep_call_instantiate(
     return instance;
 }
 
-HSEP_API hsep_status hsep_call_logging(void *handle, const hsep_call *call, int on, size_t n, const char *const names[])
+HSEP_API hsep_status
+hsep_call_logging(hsep_instance *instance, const hsep_call *call, int on, size_t n, const char *const names[])
 {
-    hsep_instance *instance = hsep_begin(handle, call);
     unsigned named = 0;
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
     if (n > 0 && names == NULL) {
         return hsep_refuse(instance, "%s: categories is NULL, but nCategories is %lu", call->name, (unsigned long)n);
     }
@@ -143,13 +140,9 @@ HSEP_API hsep_status hsep_call_logging(void *handle, const hsep_call *call, int 
     return HSEP_OK;
 }
 
-HSEP_API hsep_status
-hsep_call_experiment(void *handle, const hsep_call *call, double start_time, int has_stop_time, double stop_time)
+HSEP_API hsep_status hsep_call_experiment(
+    hsep_instance *instance, const hsep_call *call, double start_time, int has_stop_time, double stop_time)
 {
-    hsep_instance *instance = hsep_begin(handle, call);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
     if (!isfinite(start_time)) {
         return hsep_refuse(instance, "%s: startTime must be finite, got %g s", call->name, start_time);
     }
@@ -166,23 +159,15 @@ hsep_call_experiment(void *handle, const hsep_call *call, double start_time, int
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_phase(void *handle, const hsep_call *call, hsep_phase phase)
+HSEP_API hsep_status hsep_call_phase(hsep_instance *instance, hsep_phase phase)
 {
-    hsep_instance *instance = hsep_begin(handle, call);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
     instance->experiment.phase = phase;
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_initialise(void *handle, const hsep_call *call)
+HSEP_API hsep_status hsep_call_initialise(hsep_instance *instance, const hsep_call *call)
 {
-    hsep_instance *instance = hsep_begin(handle, call);
     char message[HSEP_MESSAGE_SIZE] = "";
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
     const hsep_status status = hsep_instance_initialise(instance, call->name, message);
     if (status == HSEP_REFUSED) {
         return hsep_refuse(instance, "%s", message);
@@ -196,13 +181,9 @@ HSEP_API hsep_status hsep_call_initialise(void *handle, const hsep_call *call)
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_step(void *handle, const hsep_call *call, double t, double h)
+HSEP_API hsep_status hsep_call_step(hsep_instance *instance, const hsep_call *call, double t, double h)
 {
-    hsep_instance *instance = hsep_begin(handle, call);
     char message[HSEP_MESSAGE_SIZE] = "";
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
     if (instance->experiment.has_stop_time && t >= instance->experiment.stop_time - calls_stop_tolerance * h) {
         return hsep_refuse(
             instance, "%s: a step must begin before the stop time %.9g s, got one from %.9g s", call->name,
@@ -218,15 +199,5 @@ HSEP_API hsep_status hsep_call_step(void *handle, const hsep_call *call, double 
         instance->warned |= (unsigned)status;
         hsep_log(instance, HSEP_LOG_WARNING, "%s: %s", call->name, message);
     }
-    return HSEP_OK;
-}
-
-HSEP_API hsep_status hsep_call_reset(void *handle, const hsep_call *call)
-{
-    hsep_instance *instance = hsep_begin(handle, call);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
-    hsep_instance_reset(instance);
     return HSEP_OK;
 }

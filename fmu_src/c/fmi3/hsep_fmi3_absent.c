@@ -1,7 +1,10 @@
 /* What modelDescription.xml says is absent: clocks, events, derivatives, dependencies of single elements, and
  * the other kinds of FMUs. The functions are there, since importers look them all up; they are refused in every state.
  */
-#include "hsep_fmi3_calls.h"
+#include "hsep_calls.h"
+#include "hsep_fmu.h" /* before the importer's header: it names FMI3_FUNCTION_PREFIX */
+
+#include "fmi3Functions.h"
 
 /* Refuse a call; its further arguments are only named, so that no compiler finds them unused. */
 static fmi3Status fmi3_absent(fmi3Instance instance, const char *name, const char *why, ...)
