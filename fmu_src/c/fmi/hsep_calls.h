@@ -25,9 +25,9 @@ typedef struct {
     unsigned legal;
 } hsep_call;
 
-/* A row of a version's table of calls: its record, which HSEP_CALL finds. */
+/* A row of a version's table of calls: its record; and where it is; v: fmi2, function: Reset. */
 #define HSEP_CALL_ROW(function, legal) static const hsep_call function##_call = {#function, legal};
-#define HSEP_CALL(function) (&function##_call)
+#define HSEP_CALL(v, function) (&v##function##_call)
 
 /* The phases, short, for the columns of a table of calls. */
 enum {
@@ -46,11 +46,11 @@ HSEP_API hsep_instance *hsep_call_instantiate(
 /* The instance if the call is legal now; otherwise NULL, and why not is logged. */
 HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call);
 
-/* Body of a function of a version, v: if the call is legal, do an action, which returns a hsep_status, on self. */
-#define HSEP_DO(v, handle, function, action) \
-    const hsep_call *call = HSEP_CALL(function); \
+/* Body of a function of a version: if the call is legal, do an action, which returns a hsep_status, on self. */
+#define HSEP_DO(v, function, handle, action) \
+    const hsep_call *call = HSEP_CALL(v, function); \
     hsep_instance *self = hsep_begin(handle, call); \
-    return self != NULL && (action) != HSEP_REFUSED ? v##OK : v##Error;
+    return self != NULL && (action) != HSEP_REFUSED ? v##OK : v##Error
 
 /* Hand a message, formatted as printf does, to the importer's logger if its category is on. */
 HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, const char *format, ...);
@@ -121,8 +121,8 @@ hsep_call_tune(const hsep_instance *instance, const hsep_call *call, unsigned re
 HSEP_API int hsep_values_integer(double number);
 
 /* Begin of a function of a version, v, that gets or sets n variables: it returns if they may not be. */
-#define HSEP_ACCESS(v, handle, function, references, n, values, n_values) \
-    const hsep_call *call = HSEP_CALL(function); \
+#define HSEP_ACCESS(v, function, handle, references, n, values, n_values) \
+    const hsep_call *call = HSEP_CALL(v, function); \
     hsep_instance *self = hsep_begin(handle, call); \
     if (self == NULL || hsep_call_access(self, call, references, n, values, n_values) != HSEP_OK) { \
         return v##Error; \
@@ -130,8 +130,8 @@ HSEP_API int hsep_values_integer(double number);
 
 /* Bodies of these functions. get: the function's value of a double, number; set: the double of its value, number. What
  * is set has one value for each reference, as no array is an input or a parameter; if one is refused, none is set. */
-#define HSEP_GET(v, handle, function, references, n, to, n_values, get) \
-    HSEP_ACCESS(v, handle, function, references, n, to, n_values) \
+#define HSEP_GET(v, function, handle, references, n, to, n_values, get) \
+    HSEP_ACCESS(v, function, handle, references, n, to, n_values) \
     for (size_t i = 0; i < n; i++) { \
         size_t count = 0; \
         const double *source = hsep_values_source(self, references[i], &count); \
@@ -140,10 +140,10 @@ HSEP_API int hsep_values_integer(double number);
             *to++ = get; \
         } \
     } \
-    return v##OK;
+    return v##OK
 
-#define HSEP_SET(v, handle, function, references, n, from, n_values, type, set) \
-    HSEP_ACCESS(v, handle, function, references, n, from, n_values) \
+#define HSEP_SET(v, function, handle, references, n, from, n_values, type, set) \
+    HSEP_ACCESS(v, function, handle, references, n, from, n_values) \
     for (size_t i = 0; i < n; i++) { \
         const type number = from[i]; \
         if (hsep_call_tune(self, call, references[i], set) != HSEP_OK) { \
@@ -154,33 +154,45 @@ HSEP_API int hsep_values_integer(double number);
         const type number = from[i]; \
         self->values[references[i]] = set; \
     } \
-    return v##OK;
+    return v##OK
 
-/* The functions of a version, v (fmi2), that others have by other names: of a handle's type, v##Handle, of a state's,
- * v##State, whose reading is spelt De (DeSerialize). */
+/* The functions of a version that others have by other names: of a handle's type, v##Handle, of a state's, v##State,
+ * whose reading is spelt De (DeSerialize). */
 #define HSEP_COMMON_FUNCTIONS(v, Handle, State, De) \
     void v##FreeInstance(v##Handle c) { hsep_instance_free(c); } \
-    v##Status v##SetDebugLogging(v##Handle c, v##Boolean on, size_t n, const v##String categories[]){HSEP_DO( \
-        v, c, v##SetDebugLogging, \
-        hsep_call_logging(self, call, on, n, categories))} v##Status v##ExitInitializationMode(v##Handle c){ \
-        HSEP_DO( \
-            v, c, v##ExitInitializationMode, hsep_call_initialise(self, call))} v##Status v##Terminate(v##Handle c){ \
-        HSEP_DO(v, c, v##Terminate, hsep_call_phase(self, HSEP_TERMINATED))} v##Status \
-        v##Reset(v##Handle c){HSEP_DO(v, c, v##Reset, (hsep_instance_reset(self), HSEP_OK))} v##Status v##Get##State( \
-            v##Handle c, v##State *state){HSEP_DO( \
-            v, c, v##Get##State, \
-            hsep_call_save(self, call, state))} v##Status v##Set##State(v##Handle c, v##State state){ \
-            HSEP_DO( \
-                v, c, v##Set##State, \
-                hsep_call_restore(self, call, state))} v##Status v##Free##State(v##Handle c, v##State *state){ \
-            HSEP_DO(v, c, v##Free##State, hsep_call_free_state(self, call, state))} v##Status \
-            v##Serialized##State##Size(v##Handle c, v##State state, size_t *size){ \
-                HSEP_DO(v, c, v##Serialized##State##Size, hsep_call_state_size(self, call, state, size))} v##Status \
-                v##Serialize##State(v##Handle c, v##State state, v##Byte bytes[], size_t size){ \
-                    HSEP_DO(v, c, v##Serialize##State, hsep_call_serialise(self, call, state, bytes, size))} v##Status \
-                    v##De##State(v##Handle c, const v##Byte bytes[], size_t size, v##State *state) \
+    v##Status v##SetDebugLogging(v##Handle c, v##Boolean on, size_t n, const v##String categories[]) \
     { \
-        HSEP_DO(v, c, v##De##State, hsep_call_deserialise(self, call, bytes, size, state)) \
+        HSEP_DO(v, SetDebugLogging, c, hsep_call_logging(self, call, on, n, categories)); \
+    } \
+    v##Status v##ExitInitializationMode(v##Handle c) \
+    { \
+        HSEP_DO(v, ExitInitializationMode, c, hsep_call_initialise(self, call)); \
+    } \
+    v##Status v##Terminate(v##Handle c) { HSEP_DO(v, Terminate, c, hsep_call_phase(self, HSEP_TERMINATED)); } \
+    v##Status v##Reset(v##Handle c) { HSEP_DO(v, Reset, c, (hsep_instance_reset(self), HSEP_OK)); } \
+    v##Status v##Get##State(v##Handle c, v##State *state) \
+    { \
+        HSEP_DO(v, Get##State, c, hsep_call_save(self, call, state)); \
+    } \
+    v##Status v##Set##State(v##Handle c, v##State state) \
+    { \
+        HSEP_DO(v, Set##State, c, hsep_call_restore(self, call, state)); \
+    } \
+    v##Status v##Free##State(v##Handle c, v##State *state) \
+    { \
+        HSEP_DO(v, Free##State, c, hsep_call_free_state(self, call, state)); \
+    } \
+    v##Status v##Serialized##State##Size(v##Handle c, v##State state, size_t *size) \
+    { \
+        HSEP_DO(v, Serialized##State##Size, c, hsep_call_state_size(self, call, state, size)); \
+    } \
+    v##Status v##Serialize##State(v##Handle c, v##State state, v##Byte bytes[], size_t size) \
+    { \
+        HSEP_DO(v, Serialize##State, c, hsep_call_serialise(self, call, state, bytes, size)); \
+    } \
+    v##Status v##De##State(v##Handle c, const v##Byte bytes[], size_t size, v##State *state) \
+    { \
+        HSEP_DO(v, De##State, c, hsep_call_deserialise(self, call, bytes, size, state)); \
     }
 
 #endif

@@ -122,27 +122,31 @@ fmi2Status fmi2SetupExperiment(
 {
     (void)toleranceDefined;
     (void)tolerance;
-    HSEP_DO(fmi2, c, fmi2SetupExperiment, hsep_call_experiment(self, call, startTime, stopTimeDefined, stopTime))
+    HSEP_DO(fmi2, SetupExperiment, c, hsep_call_experiment(self, call, startTime, stopTimeDefined, stopTime));
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component c){
-    HSEP_DO(fmi2, c, fmi2EnterInitializationMode, hsep_call_phase(self, HSEP_INITIALIZATION))}
+fmi2Status fmi2EnterInitializationMode(fmi2Component c)
+{
+    HSEP_DO(fmi2, EnterInitializationMode, c, hsep_call_phase(self, HSEP_INITIALIZATION));
+}
 
 fmi2Status fmi2DoStep(
     fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
     fmi2Boolean noSetFMUStatePriorToCurrentPoint)
 {
     (void)noSetFMUStatePriorToCurrentPoint;
-    HSEP_DO(fmi2, c, fmi2DoStep, hsep_call_step(self, call, currentCommunicationPoint, communicationStepSize))
+    HSEP_DO(fmi2, DoStep, c, hsep_call_step(self, call, currentCommunicationPoint, communicationStepSize));
 }
 
 /* Variables. A call is checked as a whole first: if one is refused, none is touched. */
 #define FMI2_ACCESS(type, get, set) \
-    fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##type value[]){ \
-        HSEP_GET(fmi2, c, fmi2Get##type, vr, nvr, value, nvr, get)} fmi2Status \
-        fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2##type value[]) \
+    fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##type value[]) \
     { \
-        HSEP_SET(fmi2, c, fmi2Set##type, vr, nvr, value, nvr, fmi2##type, set) \
+        HSEP_GET(fmi2, Get##type, c, vr, nvr, value, nvr, get); \
+    } \
+    fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2##type value[]) \
+    { \
+        HSEP_SET(fmi2, Set##type, c, vr, nvr, value, nvr, fmi2##type, set); \
     }
 
 FMI2_ACCESS(Real, number, number)
@@ -150,12 +154,14 @@ FMI2_ACCESS(Integer, hsep_values_integer(number), (double)number)
 FMI2_ACCESS(Boolean, number != 0.0, number ? 1.0 : 0.0)
 
 /* There are no variables of type String: with references, the access is refused by name. */
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[]){
-    HSEP_DO(fmi2, c, fmi2GetString, hsep_call_access(self, call, vr, nvr, value, nvr))}
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
+{
+    HSEP_DO(fmi2, GetString, c, hsep_call_access(self, call, vr, nvr, value, nvr));
+}
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
 {
-    HSEP_DO(fmi2, c, fmi2SetString, hsep_call_access(self, call, vr, nvr, value, nvr))
+    HSEP_DO(fmi2, SetString, c, hsep_call_access(self, call, vr, nvr, value, nvr));
 }
 
 /* The derivatives count only for the next step. Like the values, none is taken if one is refused. */
@@ -198,20 +204,20 @@ fmi2Status fmi2SetRealInputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], const fmi2Real value[])
 {
     const hsep_access access = {"fmi2SetRealInputDerivatives", "Real", vr, nvr, value, nvr};
-    HSEP_DO(fmi2, c, fmi2SetRealInputDerivatives, fmi2_set_derivatives(self, &access, order, value))
+    HSEP_DO(fmi2, SetRealInputDerivatives, c, fmi2_set_derivatives(self, &access, order, value));
 }
 
-fmi2Status fmi2CancelStep(fmi2Component c){HSEP_DO(fmi2, c, fmi2CancelStep, HSEP_REFUSED)}
+fmi2Status fmi2CancelStep(fmi2Component c) { HSEP_DO(fmi2, CancelStep, c, HSEP_REFUSED); }
 
 /* Refuse a call for what modelDescription.xml says. */
 #define FMI2_ABSENT(function, why) \
-    HSEP_DO(fmi2, c, function, hsep_refuse(self, "%s is not supported: %s in modelDescription.xml", call->name, why))
+    HSEP_DO(fmi2, function, c, hsep_refuse(self, "%s is not supported: %s in modelDescription.xml", call->name, why))
 
 fmi2Status fmi2GetRealOutputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], fmi2Real value[])
 {
     (void)vr, (void)nvr, (void)order, (void)value;
-    FMI2_ABSENT(fmi2GetRealOutputDerivatives, "maxOutputDerivativeOrder is 0")
+    FMI2_ABSENT(GetRealOutputDerivatives, "maxOutputDerivativeOrder is 0");
 }
 
 fmi2Status fmi2GetDirectionalDerivative(
@@ -219,34 +225,35 @@ fmi2Status fmi2GetDirectionalDerivative(
     size_t nKnown, const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 {
     (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
-    FMI2_ABSENT(fmi2GetDirectionalDerivative, "providesDirectionalDerivative is false")
+    FMI2_ABSENT(GetDirectionalDerivative, "providesDirectionalDerivative is false");
 }
 
 /* The functions that get a status: whether that one, s, is known, and its value. */
 #define FMI2_STATUS(function, type, known, answer) \
-    fmi2Status function(fmi2Component c, const fmi2StatusKind s, type *value) \
+    fmi2Status fmi2##function(fmi2Component c, const fmi2StatusKind s, type *value) \
     { \
-        hsep_instance *instance = hsep_begin(c, HSEP_CALL(function)); \
+        const hsep_call *call = HSEP_CALL(fmi2, function); \
+        hsep_instance *self = hsep_begin(c, call); \
         (void)s; \
-        if (instance == NULL) { \
+        if (self == NULL) { \
             return fmi2Error; \
         } \
         if (value == NULL) { \
-            (void)hsep_refuse(instance, #function ": value is NULL"); \
+            (void)hsep_refuse(self, "%s: value is NULL", call->name); \
             return fmi2Error; \
         } \
         if (!(known)) { \
             hsep_log( \
-                instance, HSEP_LOG_DISCARD, \
-                #function ": this status does not exist, because no step is ever pending"); \
+                self, HSEP_LOG_DISCARD, "%s: this status does not exist, because no step is ever pending", \
+                call->name); \
             return fmi2Discard; \
         } \
         *value = answer; \
         return fmi2OK; \
     }
 
-FMI2_STATUS(fmi2GetStatus, fmi2Status, 0, fmi2OK)
-FMI2_STATUS(fmi2GetRealStatus, fmi2Real, s == fmi2LastSuccessfulTime, instance->experiment.time)
-FMI2_STATUS(fmi2GetIntegerStatus, fmi2Integer, 0, 0)
-FMI2_STATUS(fmi2GetBooleanStatus, fmi2Boolean, s == fmi2Terminated, fmi2False)
-FMI2_STATUS(fmi2GetStringStatus, fmi2String, 0, NULL)
+FMI2_STATUS(GetStatus, fmi2Status, 0, fmi2OK)
+FMI2_STATUS(GetRealStatus, fmi2Real, s == fmi2LastSuccessfulTime, self->experiment.time)
+FMI2_STATUS(GetIntegerStatus, fmi2Integer, 0, 0)
+FMI2_STATUS(GetBooleanStatus, fmi2Boolean, s == fmi2Terminated, fmi2False)
+FMI2_STATUS(GetStringStatus, fmi2String, 0, NULL)

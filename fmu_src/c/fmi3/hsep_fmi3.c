@@ -141,14 +141,19 @@ fmi3Instance fmi3InstantiateCoSimulation(
 
 HSEP_COMMON_FUNCTIONS(fmi3, Instance, FMUState, Deserialize)
 
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance){HSEP_DO(
-    fmi3, instance, fmi3EnterConfigurationMode,
-    self -> context.window > 0
-        ? hsep_call_phase(self, HSEP_CONFIGURATION)
-        : hsep_refuse(self, "%s: there is no structural parameter in modelDescription.xml", call->name))}
+fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
+{
+    HSEP_DO(
+        fmi3, EnterConfigurationMode, instance,
+        self->context.window > 0
+            ? hsep_call_phase(self, HSEP_CONFIGURATION)
+            : hsep_refuse(self, "%s: there is no structural parameter in modelDescription.xml", call->name));
+}
 
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance){
-    HSEP_DO(fmi3, instance, fmi3ExitConfigurationMode, hsep_call_phase(self, HSEP_INSTANTIATED))}
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance)
+{
+    HSEP_DO(fmi3, ExitConfigurationMode, instance, hsep_call_phase(self, HSEP_INSTANTIATED));
+}
 
 fmi3Status fmi3EnterInitializationMode(
     fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance, fmi3Float64 startTime,
@@ -156,10 +161,10 @@ fmi3Status fmi3EnterInitializationMode(
 {
     (void)toleranceDefined, (void)tolerance;
     HSEP_DO(
-        fmi3, instance, fmi3EnterInitializationMode,
+        fmi3, EnterInitializationMode, instance,
         hsep_call_experiment(self, call, startTime, stopTimeDefined, stopTime) == HSEP_OK
             ? hsep_call_phase(self, HSEP_INITIALIZATION)
-            : HSEP_REFUSED)
+            : HSEP_REFUSED);
 }
 
 fmi3Status fmi3DoStep(
@@ -167,7 +172,7 @@ fmi3Status fmi3DoStep(
     fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
     fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
 {
-    const hsep_call *call = HSEP_CALL(fmi3DoStep);
+    const hsep_call *call = HSEP_CALL(fmi3, DoStep);
     hsep_instance *self = hsep_begin(instance, call);
     (void)noSetFMUStatePriorToCurrentPoint;
     if (self == NULL) {
@@ -189,7 +194,7 @@ fmi3Status fmi3DoStep(
     fmi3Status fmi3Get##type( \
         fmi3Instance instance, const fmi3ValueReference references[], size_t n, fmi3##type values[], size_t n_values) \
     { \
-        HSEP_GET(fmi3, instance, fmi3Get##type, references, n, values, n_values, get) \
+        HSEP_GET(fmi3, Get##type, instance, references, n, values, n_values, get); \
     }
 
 #define FMI3_ACCESS(type, get, set) \
@@ -198,7 +203,7 @@ fmi3Status fmi3DoStep(
         fmi3Instance instance, const fmi3ValueReference references[], size_t n, const fmi3##type values[], \
         size_t n_values) \
     { \
-        HSEP_SET(fmi3, instance, fmi3Set##type, references, n, values, n_values, fmi3##type, set) \
+        HSEP_SET(fmi3, Set##type, instance, references, n, values, n_values, fmi3##type, set); \
     }
 
 FMI3_ACCESS(Float64, number, number)
@@ -212,7 +217,7 @@ FMI3_GET(UInt64, (fmi3UInt64)number)
 fmi3Status fmi3SetUInt64(
     fmi3Instance instance, const fmi3ValueReference references[], size_t n, const fmi3UInt64 values[], size_t n_values)
 {
-    HSEP_ACCESS(fmi3, instance, fmi3SetUInt64, references, n, values, n_values)
+    HSEP_ACCESS(fmi3, SetUInt64, instance, references, n, values, n_values)
     char message[HSEP_MESSAGE_SIZE] = "";
     for (size_t i = 0; i < n; i++) {
         if (hsep_call_tune(self, call, references[i], (double)values[i]) != HSEP_OK) {
@@ -227,11 +232,11 @@ fmi3Status fmi3SetUInt64(
 }
 
 /* Access to types that no variable has: with references, it is refused by name. */
-#define FMI3_REFUSED(function, c_type) \
-    fmi3Status fmi3##function( \
+#define FMI3_REFUSED(name, c_type) \
+    fmi3Status fmi3##name( \
         fmi3Instance instance, const fmi3ValueReference references[], size_t n, c_type values[], size_t n_values) \
     { \
-        HSEP_DO(fmi3, instance, fmi3##function, hsep_call_access(self, call, references, n, values, n_values)) \
+        HSEP_DO(fmi3, name, instance, hsep_call_access(self, call, references, n, values, n_values)); \
     }
 #define FMI3_NO_VARIABLE(type) \
     FMI3_REFUSED(Get##type, fmi3##type) \
@@ -250,7 +255,7 @@ fmi3Status fmi3GetBinary(
     size_t n_values)
 {
     (void)sizes;
-    HSEP_DO(fmi3, instance, fmi3GetBinary, hsep_call_access(self, call, references, n, values, n_values))
+    HSEP_DO(fmi3, GetBinary, instance, hsep_call_access(self, call, references, n, values, n_values));
 }
 
 fmi3Status fmi3SetBinary(
@@ -258,5 +263,5 @@ fmi3Status fmi3SetBinary(
     const fmi3Binary values[], size_t n_values)
 {
     (void)sizes;
-    HSEP_DO(fmi3, instance, fmi3SetBinary, hsep_call_access(self, call, references, n, values, n_values))
+    HSEP_DO(fmi3, SetBinary, instance, hsep_call_access(self, call, references, n, values, n_values));
 }
