@@ -3,8 +3,7 @@
  * Single variables and modes have a value reference for each value, windows one each, then comes the time. Where there
  * are windows, Np is the structural parameter that sizes them.
  */
-#include "hsep_calls.h"
-#include "hsep_fmu.h" /* before the importer's header: it names FMI3_FUNCTION_PREFIX */
+#include "hsep_calls.h" /* before the importer's header: it names FMI3_FUNCTION_PREFIX */
 #include "hsep_text.h"
 
 #include "fmi3Functions.h"
