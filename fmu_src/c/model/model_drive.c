@@ -217,6 +217,4 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     }
 }
 
-#else
-typedef int hsep_no_drive; /* a translation unit must not be empty */
 #endif

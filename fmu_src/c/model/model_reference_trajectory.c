@@ -166,6 +166,4 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     fclose(file);
 }
 
-#else
-typedef int hsep_no_reference_trajectory; /* a translation unit must not be empty */
 #endif
