@@ -7,9 +7,7 @@
 #ifndef HSEP_INSTANCE_H
 #define HSEP_INSTANCE_H
 
-#include "hsep_api.h"
 #include "hsep_fmu.h"
-#include "hsep_layout.h"
 #include "hsep_table.h"
 
 #include <stddef.h>

@@ -39,24 +39,20 @@ typedef struct {
     double values[]; /* then the model's state, aligned for double */
 } hsep_saved;
 
-/* Whether a handle is a saved state; a message says if not. */
-static int saved_is_one(const hsep_instance *instance, const hsep_call *call, const hsep_saved *saved)
+/* Check that a handle is a saved state. */
+static hsep_status saved_check(const hsep_instance *instance, const hsep_call *call, const hsep_saved *saved)
 {
     if (saved == NULL) {
-        (void)hsep_refuse(instance, "%s: the state is NULL", call->name);
-        return 0;
+        return hsep_refuse(instance, "%s: the state is NULL", call->name);
     }
-    if (memcmp(saved->magic, SAVED_MAGIC, sizeof saved->magic) != 0) {
-        (void)hsep_refuse(instance, "%s: the state is none of this FMU", call->name);
-        return 0;
-    }
-    return 1;
+    const int is_ours = memcmp(saved->magic, SAVED_MAGIC, sizeof saved->magic) == 0;
+    return is_ours ? HSEP_OK : hsep_refuse(instance, "%s: the state is none of this FMU", call->name);
 }
 
 /* The same where a place for a handle is given, which may hold none. */
-static int saved_is_place(const hsep_instance *instance, const hsep_call *call, void **place)
+static hsep_status saved_check_place(const hsep_instance *instance, const hsep_call *call, void **place)
 {
-    return place == NULL || *place == NULL || saved_is_one(instance, call, *place);
+    return place == NULL || *place == NULL ? HSEP_OK : saved_check(instance, call, *place);
 }
 
 static void saved_free(hsep_saved *saved)
@@ -96,7 +92,7 @@ static size_t saved_fixed_size(const hsep_instance *instance)
 
 HSEP_API hsep_status hsep_call_save(hsep_instance *instance, const hsep_call *call, void **state)
 {
-    if (!saved_is_place(instance, call, state)) {
+    if (saved_check_place(instance, call, state) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (state == NULL) {
@@ -129,7 +125,7 @@ HSEP_API hsep_status hsep_call_save(hsep_instance *instance, const hsep_call *ca
 HSEP_API hsep_status hsep_call_restore(hsep_instance *instance, const hsep_call *call, void *state)
 {
     const hsep_saved *saved = state;
-    if (!saved_is_one(instance, call, saved)) {
+    if (saved_check(instance, call, saved) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     const size_t n = hsep_instance_n_values(instance), size = (size_t)saved->header.state_size;
@@ -162,7 +158,7 @@ HSEP_API hsep_status hsep_call_restore(hsep_instance *instance, const hsep_call 
 
 HSEP_API hsep_status hsep_call_free_state(hsep_instance *instance, const hsep_call *call, void **state)
 {
-    if (!saved_is_place(instance, call, state)) {
+    if (saved_check_place(instance, call, state) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (state != NULL) { /* the standard: freeing nothing is fine */
@@ -174,7 +170,7 @@ HSEP_API hsep_status hsep_call_free_state(hsep_instance *instance, const hsep_ca
 HSEP_API hsep_status hsep_call_state_size(hsep_instance *instance, const hsep_call *call, void *state, size_t *size)
 {
     const hsep_saved *saved = state;
-    if (!saved_is_one(instance, call, saved)) {
+    if (saved_check(instance, call, saved) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (size == NULL) {
@@ -197,7 +193,7 @@ HSEP_API hsep_status
 hsep_call_serialise(hsep_instance *instance, const hsep_call *call, void *state, void *bytes, size_t size)
 {
     const hsep_saved *saved = state;
-    if (!saved_is_one(instance, call, saved)) {
+    if (saved_check(instance, call, saved) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     const size_t needed = (size_t)saved->header.size;
@@ -249,7 +245,7 @@ HSEP_API hsep_status
 hsep_call_deserialise(hsep_instance *instance, const hsep_call *call, const void *bytes, size_t size, void **state)
 {
     char message[HSEP_MESSAGE_SIZE] = "";
-    if (!saved_is_place(instance, call, state)) {
+    if (saved_check_place(instance, call, state) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (bytes == NULL || state == NULL) {

@@ -119,8 +119,7 @@ fmi2Status fmi2SetupExperiment(
     fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime, fmi2Boolean stopTimeDefined,
     fmi2Real stopTime)
 {
-    (void)toleranceDefined;
-    (void)tolerance;
+    (void)toleranceDefined, (void)tolerance;
     HSEP_DO(fmi2, SetupExperiment, c, hsep_call_experiment(self, call, startTime, stopTimeDefined, stopTime));
 }
 

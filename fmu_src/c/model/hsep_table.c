@@ -1,6 +1,5 @@
 #include "hsep_table.h"
 
-#include "hsep_layout.h"
 #include "hsep_text.h"
 
 #include <string.h>

@@ -2,7 +2,6 @@
 #ifndef HSEP_TABLE_H
 #define HSEP_TABLE_H
 
-#include "hsep_api.h"
 #include "hsep_model.h"
 #include "hsep_physics.h"
 

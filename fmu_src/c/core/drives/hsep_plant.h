@@ -8,9 +8,7 @@
 #ifndef HSEP_PLANT_H
 #define HSEP_PLANT_H
 
-#include "hsep_api.h"
 #include "hsep_clock.h"
-#include "hsep_layout.h"
 #include "hsep_physics.h"
 
 #include <stdint.h>
