@@ -5,7 +5,7 @@
 
 #include "fmi3Functions.h"
 
-#ifdef __GNUC__
+#if defined(__GNUC__) || defined(__clang__)
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter" /* they read nothing but the instance */
 #endif
@@ -37,7 +37,8 @@ FMI3_ABSENT(UpdateDiscreteStates, fmi3_no_event_mode, fmi3Instance instance, fmi
 #define FMI3_CLOCKS fmi3Instance instance, const fmi3ValueReference clocks[], size_t n
 FMI3_ABSENT(GetClock, fmi3_no_clock, FMI3_CLOCKS, fmi3Clock values[])
 FMI3_ABSENT(SetClock, fmi3_no_clock, FMI3_CLOCKS, const fmi3Clock values[])
-FMI3_ABSENT(GetIntervalDecimal, fmi3_no_clock, FMI3_CLOCKS, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+FMI3_ABSENT(GetIntervalDecimal, fmi3_no_clock, FMI3_CLOCKS, fmi3Float64 intervals[],
+    fmi3IntervalQualifier qualifiers[])
 FMI3_ABSENT(GetIntervalFraction, fmi3_no_clock, FMI3_CLOCKS, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
     fmi3IntervalQualifier qualifiers[])
 FMI3_ABSENT(GetShiftDecimal, fmi3_no_clock, FMI3_CLOCKS, fmi3Float64 shifts[])
@@ -67,10 +68,12 @@ FMI3_ABSENT(CompletedIntegratorStep, fmi3_no_model_exchange, fmi3Instance instan
     fmi3Boolean *event, fmi3Boolean *terminate)
 FMI3_ABSENT(SetTime, fmi3_no_model_exchange, fmi3Instance instance, fmi3Float64 time)
 FMI3_ABSENT(SetContinuousStates, fmi3_no_model_exchange, fmi3Instance instance, const fmi3Float64 states[], size_t n)
-FMI3_ABSENT(GetContinuousStateDerivatives, fmi3_no_model_exchange, fmi3Instance instance, fmi3Float64 slopes[], size_t n)
+FMI3_ABSENT(GetContinuousStateDerivatives, fmi3_no_model_exchange, fmi3Instance instance,
+    fmi3Float64 slopes[], size_t n)
 FMI3_ABSENT(GetEventIndicators, fmi3_no_model_exchange, fmi3Instance instance, fmi3Float64 indicators[], size_t n)
 FMI3_ABSENT(GetContinuousStates, fmi3_no_model_exchange, fmi3Instance instance, fmi3Float64 states[], size_t n)
-FMI3_ABSENT(GetNominalsOfContinuousStates, fmi3_no_model_exchange, fmi3Instance instance, fmi3Float64 states[], size_t n)
+FMI3_ABSENT(GetNominalsOfContinuousStates, fmi3_no_model_exchange, fmi3Instance instance,
+    fmi3Float64 states[], size_t n)
 FMI3_ABSENT(GetNumberOfEventIndicators, fmi3_no_model_exchange, fmi3Instance instance, size_t *n)
 FMI3_ABSENT(GetNumberOfContinuousStates, fmi3_no_model_exchange, fmi3Instance instance, size_t *n)
 
@@ -91,6 +94,6 @@ FMI3_NO_INSTANCE(ScheduledExecution, fmi3LogMessageCallback logger, fmi3ClockUpd
     fmi3LockPreemptionCallback lockPreemption, fmi3UnlockPreemptionCallback unlockPreemption)
 /* clang-format on */
 
-#ifdef __GNUC__
+#if defined(__GNUC__) || defined(__clang__)
 #pragma GCC diagnostic pop
 #endif

@@ -65,8 +65,7 @@ static void online_write_predicted(const hsep_predictor_outputs *outputs, double
 /* The model's own ---------------------------------------------------------------------------------------------------
  * online_check: of its settings together, each problem added to message. online_derive: its parameters, after all were
  * checked and the common ones read. online_tune: the tunable parameters, from the next window on. online_begin: after
- * learned weights were loaded. online_x_load: the drive's load. online_sample: process a
- * sample. */
+ * learned weights were loaded. online_x_load: the drive's load. online_sample: process a sample. */
 
 #if defined(HSEP_MODEL_HYBRID_PREDICTOR)
 
@@ -300,10 +299,11 @@ static int online_next(online_inputs *self, online_step *step)
 
 /* Both models' ---------------------------------------------------------------------------------------------------- */
 
-/* Check all parameters, and read them: those of the library, whose modes stay in values, and the model's. */
+/* Check all parameters, and read them: those of the library, whose modes stay in values, and the model's; size: of the
+ * state, bytes. */
 static hsep_status online_checked(
     const hsep_context *context, const double values[], hsep_parameters *parameters, online_parameters *derived,
-    char message[])
+    size_t *size, char message[])
 {
     const double Np = values[HSEP_VR_Np], p = values[HSEP_VR_p], q = values[HSEP_VR_q];
     message[0] = '\0';
@@ -327,11 +327,6 @@ static hsep_status online_checked(
     HSEP_AVERAGING_SETTINGS(READ)
 #undef READ
     *derived = online_derive(values, parameters);
-    return HSEP_OK;
-}
-
-static hsep_status online_size(const online_parameters *derived, size_t *size, char message[])
-{
     const double before = (double)(sizeof(online_state) - sizeof(online_block));
     return hsep_check_bytes(before + ONLINE(lay_out)(&(online_block){0}, derived), size, message);
 }
@@ -340,9 +335,7 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
 {
     hsep_parameters parameters;
     online_parameters derived;
-    return online_checked(context, values, &parameters, &derived, message) == HSEP_OK
-               ? online_size(&derived, size, message)
-               : HSEP_REFUSED;
+    return online_checked(context, values, &parameters, &derived, size, message);
 }
 
 /* Add to message what differs from what the weights were learned with. */
@@ -416,8 +409,8 @@ HSEP_API hsep_status hsep_model_initialise(
     hsep_parameters parameters;
     online_parameters derived;
     const double start = values[HSEP_VR_x_d_ahead];
-    if (online_checked(context, values, &parameters, &derived, message) != HSEP_OK ||
-        online_size(&derived, &needed, message) != HSEP_OK || hsep_check_memory(needed, size, message) != HSEP_OK ||
+    if (online_checked(context, values, &parameters, &derived, &needed, message) != HSEP_OK ||
+        hsep_check_memory(needed, size, message) != HSEP_OK ||
         hsep_model_check_start(context, values, message) != HSEP_OK ||
         hsep_check_clock(&self->inputs.clock, t_start, values[HSEP_VR_T_s], message) != HSEP_OK) {
         return HSEP_REFUSED;

@@ -35,12 +35,6 @@ HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self)
     return fmax(sqrt(self->k / self->m), self->c / self->m);
 }
 
-HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start)
-{
-    self->start = start;
-    self->x = self->u = self->x_d = 0.0;
-}
-
 HSEP_API double hsep_feed_drive_x(const hsep_feed_drive *self) { return self->start + self->x; }
 
 HSEP_API double hsep_feed_drive_v(const hsep_feed_drive *self) { return self->u + self->c / self->m * self->x_d; }
@@ -108,12 +102,10 @@ HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,
     double start)
 {
-    self->friction_gain = 0.0;
-    self->start = start;
-    self->acting = self->last_x_d = self->v_d = self->v = 0.0;
-    self->oldest = 0;
-    (void)hsep_clock_init(&self->clock, 0.0, T_s);
+    memset(self, 0, (size_t)hsep_stage_size(n_modes, settings));
     (void)stage_lay_out(self, n_modes, settings);
+    (void)hsep_clock_init(&self->clock, 0.0, T_s);
+    self->start = start;
     hsep_stage_mode *stage = (hsep_stage_mode *)hsep_at(self, self->modes);
     for (uint64_t i = 0; i < n_modes; i++) {
         const double omega = HSEP_TWO_PI * modes[i].f_n;
@@ -124,8 +116,6 @@ HSEP_API void hsep_stage_init(
         self->friction_gain += modes[i].beta;
     }
     self->friction_gain *= settings->f;
-    memset(hsep_at(self, self->z), 0, (size_t)(2 * n_modes) * sizeof(double));
-    memset(hsep_at(self, self->line), 0, (size_t)self->n_line * sizeof(double));
 }
 
 /* sum alpha z + beta z' over the modes, z: (2 n_modes,). */
@@ -290,6 +280,8 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
     return 1;
 }
 
+HSEP_API double hsep_stage_v(const hsep_stage *self) { return self->v; }
+
 HSEP_API double hsep_stage_x(const hsep_stage *self)
 {
     return self->start + plant_position(self, hsep_at_const(self, self->z));
@@ -302,13 +294,6 @@ static uint64_t encoder_split_mix_64(uint64_t seed, uint64_t index)
     z = (z ^ (z >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
     z = (z ^ (z >> 27)) * UINT64_C(0x94D049BB133111EB);
     return z ^ (z >> 31);
-}
-
-HSEP_API void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed)
-{
-    self->noise_std = noise_std;
-    self->seed = seed;
-    self->n_draws = 0;
 }
 
 HSEP_API double hsep_encoder_measure(hsep_encoder *self, double x)

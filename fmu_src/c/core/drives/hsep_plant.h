@@ -22,16 +22,13 @@ HSEP_API double hsep_plant_step_max(double rate);
 HSEP_API double hsep_plant_mode_rate(const hsep_mode *mode);
 
 /* m x'' + c x' + k x + H_NL = c x_d' + k x_d with H_NL = c_nl x'|x'| + k_nl x|x|, eq. (13), in the states x and
- * u = x' - (c/m) x_d. */
+ * u = x' - (c/m) x_d. The caller sets parameters and start; the drive rests where the others are 0. */
 typedef struct {
     double m, c, k;    /* kg, N.s/m, N/m, > 0 */
     double c_nl, k_nl; /* N.s2/m2, N/m2, >= 0 */
     double start;      /* position of rest, m */
     double x, u, x_d;  /* m, m/s, and the last command, m, from there */
 } hsep_feed_drive;
-
-/* Reset the drive to rest at start, m; its parameters are set by the caller. */
-HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start);
 
 /* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. Fails, and returns 0 with the state
  * unchanged, if the state overflows; *x then tells the position reached, m. */
@@ -100,18 +97,17 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
 
 HSEP_API double hsep_stage_rate(const hsep_stage *self); /* of the fastest mode, 1/s */
 HSEP_API double hsep_stage_x(const hsep_stage *self);    /* true position, m */
+HSEP_API double hsep_stage_v(const hsep_stage *self);    /* true velocity under the last step's command, m/s */
 
 /* Position sensor with Gaussian noise from a portable generator: SplitMix64 (Steele, Lea and Flood 2014) gives two
  * uniform numbers per sample, the Box-Muller transform (1958) one normal number. */
 typedef struct {
     double noise_std; /* m, >= 0 */
     uint64_t seed;
-    uint64_t n_draws; /* so far */
+    uint64_t n_draws; /* so far, 0 in the beginning */
 } hsep_encoder;
 
 HSEP_ASSERT_WORDS(hsep_encoder, 3);
-
-HSEP_API void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed);
 
 /* Return one measurement of the position x, m. Constant cost; cannot fail. */
 HSEP_API double hsep_encoder_measure(hsep_encoder *self, double x);
