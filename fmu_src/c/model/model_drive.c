@@ -13,7 +13,6 @@
 #include "hsep_table.h"
 
 #include <math.h>
-#include <string.h>
 
 #if defined(HSEP_MODEL_FEED_DRIVE)
 #define DRIVE(function) hsep_feed_drive_##function
@@ -75,9 +74,6 @@ static hsep_status drive_step(hsep_feed_drive *self, double x_d, double h, char 
 
 #else
 
-/* Work space for a step follows the stage: zeros between steps. */
-static size_t stage_work_size(uint64_t n_modes) { return (size_t)(HSEP_STAGE_WORK * n_modes) * sizeof(double); }
-
 static hsep_stage_settings stage_settings(const double values[])
 {
     return (hsep_stage_settings){
@@ -94,7 +90,7 @@ static hsep_status drive_check(const hsep_context *context, const double values[
 {
     const hsep_mode *modes = hsep_table_modes(context, values);
     const hsep_stage_settings settings = stage_settings(values);
-    *bytes = hsep_stage_size(context->n_modes, &settings) + (double)stage_work_size(context->n_modes);
+    *bytes = hsep_stage_size(context->n_modes, &settings);
     for (size_t i = 0; i < context->n_modes; i++) {
         const double rate = hsep_plant_mode_rate(&modes[i]);
         if (rate > HSEP_PLANT_RATE_MAX) {
@@ -116,10 +112,7 @@ static void drive_begin(const hsep_context *context, hsep_stage *self, const dou
 
 static hsep_status drive_step(hsep_stage *self, double x_d, double h, char message[])
 {
-    double *work = hsep_at(self, (uint64_t)hsep_stage_size(self->n_modes, &self->settings) / sizeof(double));
-    const int done = hsep_stage_step(self, x_d, h, work);
-    memset(work, 0, stage_work_size(self->n_modes));
-    if (!done) {
+    if (!hsep_stage_step(self, x_d, h)) {
         return hsep_message_add(message, "the stage's state overflowed (command %g m)", x_d);
     }
     return HSEP_OK;

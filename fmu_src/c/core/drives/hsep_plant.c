@@ -85,6 +85,7 @@ static double stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage
     self->modes = hsep_take(&end, (double)n_modes * HSEP_WORDS(hsep_stage_mode));
     self->z = hsep_take(&end, 2.0 * (double)n_modes);
     self->line = hsep_take(&end, (double)self->n_line);
+    (void)hsep_take(&end, 8.0 * (double)n_modes); /* work space */
     return end * sizeof(double);
 }
 
@@ -229,14 +230,14 @@ HSEP_API double hsep_stage_rate(const hsep_stage *self)
     return rate;
 }
 
-HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
+HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h)
 {
     const double r = x_d - self->start;
     const int foh = self->settings.input_hold == HSEP_FIRST_ORDER_HOLD, late = self->settings.dead_time > 0;
     double acting = foh || late ? self->acting : r;
     double last_x_d = self->last_x_d, v_d = self->v_d, v = self->v, done = 0.0;
     const size_t z_size = (size_t)(2 * self->n_modes) * sizeof(double);
-    double *z = work, *slope = work + 2 * self->n_modes, *line = hsep_at(self, self->line);
+    double *line = hsep_at(self, self->line), *z = line + self->n_line, *slope = z + 2 * self->n_modes;
     hsep_clock_step step;
     (void)hsep_clock_count(&self->clock, self->clock.end, h, &step);
     memcpy(z, hsep_at(self, self->z), z_size);
@@ -261,23 +262,22 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
             last_x_d = left;
         }
     }
-    for (uint64_t i = 0; i < 2 * self->n_modes; i++) {
-        if (!(fabs(z[i]) < plant_state_max)) { /* NaN too */
-            return 0;
+    const int finite = hsep_within(z, 2 * self->n_modes, plant_state_max);
+    if (finite) {
+        plant_stage_slope(self, z, plant_disturbed(self, acting, v_d), v, slope);
+        self->v = plant_position(self, slope);
+        memcpy(hsep_at(self, self->z), z, z_size);
+        for (uint64_t i = 0; i < (uint64_t)step.n_latched && i < self->n_line; i++) {
+            line[self->oldest] = r;
+            self->oldest = (self->oldest + 1) % self->n_line;
         }
+        self->acting = acting;
+        self->last_x_d = last_x_d;
+        self->v_d = v_d;
+        self->clock = step.after;
     }
-    plant_stage_slope(self, z, plant_disturbed(self, acting, v_d), v, slope);
-    self->v = plant_position(self, slope);
-    memcpy(hsep_at(self, self->z), z, z_size);
-    for (uint64_t i = 0; i < (uint64_t)step.n_latched && i < self->n_line; i++) {
-        line[self->oldest] = r;
-        self->oldest = (self->oldest + 1) % self->n_line;
-    }
-    self->acting = acting;
-    self->last_x_d = last_x_d;
-    self->v_d = v_d;
-    self->clock = step.after;
-    return 1;
+    memset(z, 0, 4 * z_size);
+    return finite;
 }
 
 HSEP_API double hsep_stage_v(const hsep_stage *self) { return self->v; }

@@ -73,15 +73,13 @@ typedef struct {
     /* Offsets in doubles from the beginning of the struct */
     uint64_t modes; /* hsep_stage_mode[n_modes] */
     uint64_t z;     /* (2 n_modes,) z and z' of each, m s^2 and m s */
-    uint64_t line;  /* (n_line,) m from start */
+    uint64_t line;  /* (n_line,) m from start; then work space of a step, (8 n_modes,), zeros between steps */
 } hsep_stage;
 
 HSEP_ASSERT_WORDS(hsep_feed_drive, 9);
 HSEP_ASSERT_WORDS(hsep_stage_mode, 4);
 HSEP_ASSERT_WORDS(hsep_stage_settings, 6);
 HSEP_ASSERT_WORDS(hsep_stage, 23);
-
-#define HSEP_STAGE_WORK 8 /* doubles of work space for each mode */
 
 /* Bytes of the block, counted in double. */
 HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings);
@@ -91,9 +89,9 @@ HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,
     double start);
 
-/* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,).
- * Fails, and returns 0 with the state unchanged, if the state overflows. */
-HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
+/* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. Fails, and returns 0 with
+ * the state unchanged, if the state overflows. */
+HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h);
 
 HSEP_API double hsep_stage_rate(const hsep_stage *self); /* of the fastest mode, 1/s */
 HSEP_API double hsep_stage_x(const hsep_stage *self);    /* true position, m */

@@ -3,7 +3,6 @@
 #include "hsep_cholesky.h"
 #include "hsep_vector.h"
 
-#include <stddef.h>
 #include <string.h>
 
 /* Set what follows from the number of features; return the bytes of the block. */

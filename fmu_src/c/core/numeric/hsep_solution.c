@@ -4,7 +4,6 @@
 #include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include <stddef.h>
 #include <string.h>
 
 /* Set what follows from the parameters; return the bytes of the block. */
