@@ -26,32 +26,18 @@ static int calls_place(unsigned bit)
     return place;
 }
 
-static void calls_log(const hsep_instance *instance, hsep_category category, const char *format, va_list arguments)
+HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, const char *format, ...)
 {
     char text[2 * HSEP_MESSAGE_SIZE];
     const int place = calls_place((unsigned)category);
     if (instance->logger == NULL || (instance->categories & (unsigned)category) == 0) {
         return;
     }
+    va_list arguments;
+    va_start(arguments, format);
     (void)hsep_text_list(text, sizeof text, format, arguments);
+    va_end(arguments);
     instance->hand(instance, calls_status[place], calls_categories[place], text);
-}
-
-HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    calls_log(instance, category, format, arguments);
-    va_end(arguments);
-}
-
-HSEP_API hsep_status hsep_refuse(const hsep_instance *instance, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    calls_log(instance, HSEP_LOG_ERROR, format, arguments);
-    va_end(arguments);
-    return HSEP_REFUSED;
 }
 
 HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call)

@@ -55,8 +55,8 @@ HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call);
 /* Hand a message, formatted as printf does, to the importer's logger if its category is on. */
 HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, const char *format, ...);
 
-/* Log an error and return HSEP_REFUSED. */
-HSEP_API hsep_status hsep_refuse(const hsep_instance *instance, const char *format, ...);
+/* Log an error; HSEP_REFUSED. */
+#define hsep_refuse(instance, ...) (hsep_log(instance, HSEP_LOG_ERROR, __VA_ARGS__), (hsep_status)HSEP_REFUSED)
 
 /* What calls do once they are legal.
  *

@@ -108,11 +108,7 @@ static char *opening_beside(const hsep_instance *instance)
         return NULL;
     }
     size_t end = strlen(path);
-#ifdef _WIN32
-    while (end > 0 && path[end - 1] != '/' && path[end - 1] != '\\') {
-#else
-    while (end > 0 && path[end - 1] != '/') {
-#endif
+    while (end > 0 && path[end - 1] != '/' && !(OPENING_WINDOWS && path[end - 1] == '\\')) {
         end--;
     }
     char *folder = hsep_new(instance, end + sizeof OPENING_UP);

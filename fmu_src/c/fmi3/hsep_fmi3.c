@@ -4,7 +4,6 @@
  * are windows, Np is the structural parameter that sizes them.
  */
 #include "hsep_calls.h" /* before the importer's header: it names FMI3_FUNCTION_PREFIX */
-#include "hsep_text.h"
 
 #include "fmi3Functions.h"
 
@@ -68,11 +67,8 @@ static hsep_found fmi3_find(const hsep_context *context, size_t reference)
 
 static const char *fmi3_name(const hsep_context *context, size_t reference, char text[HSEP_NAME_SIZE])
 {
-    if (reference < hsep_table_n_starts(context)) {
-        return hsep_table_name(context, reference, text);
-    }
-    hsep_text(text, HSEP_NAME_SIZE, "%.60s", fmi3_find(context, reference).row->name);
-    return text;
+    const int is_single = reference < hsep_table_n_starts(context);
+    return is_single ? hsep_table_name(context, reference, text) : fmi3_find(context, reference).row->name;
 }
 
 static const hsep_fmi_names fmi3_names = {
