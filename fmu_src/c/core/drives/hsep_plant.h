@@ -59,7 +59,7 @@ typedef struct {
 /* x = G_pb (x_d - d) with d = f tanh(v_f / v_friction) + kappa x|x|; v_f is the velocity of the friction. Without a
  * dead time and held, a command acts at once; else it is sampled at the instants. A first-order hold with a dead time
  * goes from the last command to this one, which takes one sample of the dead time; without a dead time it goes on with
- * the last slope. */
+ * the last slope. A block as hsep_layout.h has them. */
 typedef struct {
     hsep_stage_settings settings;
     double friction_gain; /* m/s, velocity that the whole friction takes away at once, f sum beta */
@@ -81,8 +81,7 @@ HSEP_ASSERT_WORDS(hsep_stage_mode, 4);
 HSEP_ASSERT_WORDS(hsep_stage_settings, 6);
 HSEP_ASSERT_WORDS(hsep_stage, 23);
 
-/* Bytes of the block, counted in double. */
-HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings);
+HSEP_API double hsep_stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings);
 
 /* Reset the stage to rest at start, m. modes: (n_modes,). */
 HSEP_API void hsep_stage_init(
