@@ -25,7 +25,7 @@ typedef struct {
     unsigned legal;
 } hsep_call;
 
-/* A row of a version's table of calls: its record; and where it is; v: fmi2, function: Reset. */
+/* A row of a version's table of calls is a record, fmi2Reset_call; where it is, with v = fmi2 and function = Reset. */
 #define HSEP_CALL_ROW(function, legal) static const hsep_call function##_call = {#function, legal};
 #define HSEP_CALL(v, function) (&v##function##_call)
 

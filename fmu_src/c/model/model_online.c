@@ -53,8 +53,8 @@ static void online_write_predicted(const hsep_predictor_outputs *outputs, double
     values[HSEP_VR_x_pb] = outputs->x_pb;
     values[HSEP_VR_x_h] = outputs->x_h;
     values[HSEP_VR_x_h_std] = outputs->x_h_std;
-    values[HSEP_VR_e_servo] =
-        outputs->x_d - outputs->x_h; /* the predicted servo error, of a compensator what is left */
+    /* The predicted servo error, of a compensator what is left */
+    values[HSEP_VR_e_servo] = outputs->x_d - outputs->x_h;
     values[HSEP_VR_rms_pb] = outputs->rms_pb;
     values[HSEP_VR_rms_h] = outputs->rms_h;
     values[HSEP_VR_rms_hold] = outputs->rms_hold;
@@ -208,25 +208,18 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
 /* Inputs, which are latched at the instants within a communication step, and executed in the step that reaches the next
  * instant --------------------------------------------------------------------------------------------------------- */
 
-/* What the importer has set for a step: an input and its time derivative. */
-typedef struct {
-    double value; /* m */
-    double slope; /* m/s */
-} online_input;
-
 /* A step in progress. */
 typedef struct {
     hsep_clock_step counted;
-    online_input x_d_ahead, x_meas;
-    double x_load;                 /* m, constant over the step */
     int64_t n_latched, n_executed; /* of the instants that the step has */
     int pending;                   /* whether the inputs of the next sample are latched */
 } online_step;
 
-/* The input at an instant, s after the step's start. */
-static double online_at(online_input input, double after)
+/* An input, by its place, at an instant, s after the step's start; the importer may have set its time derivative. */
+static double online_at(const hsep_context *context, const double values[], size_t place, double after)
 {
-    return input.slope == 0.0 ? input.value : input.value + input.slope * after;
+    const double slope = values[context->n_variables + place];
+    return slope == 0.0 ? values[place] : values[place] + slope * after;
 }
 
 /* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. may_miss: whether x_meas may be
@@ -236,12 +229,7 @@ static hsep_status online_count(
     const hsep_context *context, const online_inputs *self, const double values[], int may_miss, double t, double h,
     online_step *step, char message[])
 {
-    const double *slopes = values + context->n_variables;
-    *step = (online_step){
-        .x_d_ahead = {values[HSEP_VR_x_d_ahead], slopes[HSEP_VR_x_d_ahead]},
-        .x_meas = {values[HSEP_VR_x_meas], slopes[HSEP_VR_x_meas]},
-        .x_load = online_x_load(context, values),
-        .pending = hsep_clock_latched(&self->clock)};
+    *step = (online_step){.pending = hsep_clock_latched(&self->clock)};
     if (hsep_check_step(&self->clock, t, h, &step->counted, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
@@ -252,11 +240,13 @@ static hsep_status online_count(
     /* Inputs are linear in time, so the first and the last one, s after the step's start, bound them all. */
     const double last = counted->first + (double)(counted->n_latched - 1) * self->clock.T_s;
     const double after[2] = {counted->first, last}, sample = (double)(self->clock.k + step->pending);
-    if (hsep_check_position(context, "x_load", step->x_load, " at sample %.0f", sample, message) != HSEP_OK) {
+    const double x_load = online_x_load(context, values); /* constant over the step */
+    if (hsep_check_position(context, "x_load", x_load, " at sample %.0f", sample, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     for (int i = 0; i < 2; i++) {
-        const double ahead = online_at(step->x_d_ahead, after[i]), measured = online_at(step->x_meas, after[i]);
+        const double ahead = online_at(context, values, HSEP_VR_x_d_ahead, after[i]);
+        const double measured = online_at(context, values, HSEP_VR_x_meas, after[i]);
         const int missing = may_miss && isnan(measured);
         if (hsep_check_position(context, "x_d_ahead", ahead, " at sample %.0f", sample, message) != HSEP_OK ||
             (!missing &&
@@ -277,13 +267,13 @@ static hsep_status online_count(
 }
 
 /* Go on in a counted step: return 1 with the next sample to execute in self, 0 when the step is done. */
-static int online_next(online_inputs *self, online_step *step)
+static int online_next(const hsep_context *context, online_inputs *self, const double values[], online_step *step)
 {
     if (!step->pending && step->n_latched < step->counted.n_latched) {
         const double after = step->counted.first + (double)step->n_latched * self->clock.T_s;
-        self->x_d_ahead = online_at(step->x_d_ahead, after);
-        self->x_meas = online_at(step->x_meas, after);
-        self->x_load = step->x_load;
+        self->x_d_ahead = online_at(context, values, HSEP_VR_x_d_ahead, after);
+        self->x_meas = online_at(context, values, HSEP_VR_x_meas, after);
+        self->x_load = online_x_load(context, values);
         step->pending = 1;
         step->n_latched++;
     }
@@ -459,7 +449,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
         return HSEP_REFUSED;
     }
     online_tune(&self->online, values);
-    while (online_next(&self->inputs, &step)) {
+    while (online_next(context, &self->inputs, values, &step)) {
         online_sample(&self->online, &self->inputs);
         if (online_converges(predictor, message) != HSEP_OK) {
             return HSEP_REFUSED;
