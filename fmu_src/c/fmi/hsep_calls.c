@@ -59,12 +59,20 @@ HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call)
     return NULL;
 }
 
-/* Check name and token and take the table; why not is logged. */
-static hsep_status calls_open(hsep_instance *instance, const char *name, const char *token, const char *resources)
+HSEP_API hsep_instance *hsep_call_instantiate(
+    const hsep_instance *filled, const char *name, const char *token, const char *resources, int logging_on)
 {
-    const hsep_fmi_names *names = instance->names;
+    const hsep_fmi_names *names = filled->names;
     char message[HSEP_MESSAGE_SIZE] = "";
     hsep_status status = HSEP_REFUSED;
+    hsep_instance *instance = hsep_new(filled, sizeof *instance);
+    if (instance == NULL) {
+        (void)hsep_refuse(
+            filled, "%s: no memory for an instance of %lu bytes", names->instantiate, (unsigned long)sizeof *instance);
+        return NULL;
+    }
+    *instance = *filled;
+    instance->categories = logging_on ? CALLS_LOG_EVERYTHING : CALLS_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
     if (name == NULL || name[0] == '\0') {
         (void)hsep_message_add(message, "%s: instanceName must not be empty", names->instantiate);
     } else {
@@ -78,22 +86,7 @@ static hsep_status calls_open(hsep_instance *instance, const char *name, const c
     if (status != HSEP_OK) {
         hsep_log(instance, status == HSEP_WARNED ? HSEP_LOG_WARNING : HSEP_LOG_ERROR, "%s", message);
     }
-    return status;
-}
-
-HSEP_API hsep_instance *hsep_call_instantiate(
-    const hsep_instance *filled, const char *name, const char *token, const char *resources, int logging_on)
-{
-    hsep_instance *instance = hsep_new(filled, sizeof *instance);
-    if (instance == NULL) {
-        (void)hsep_refuse(
-            filled, "%s: no memory for an instance of %lu bytes", filled->names->instantiate,
-            (unsigned long)sizeof *instance);
-        return NULL;
-    }
-    *instance = *filled;
-    instance->categories = logging_on ? CALLS_LOG_EVERYTHING : CALLS_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
-    if (calls_open(instance, name, token, resources) == HSEP_REFUSED) {
+    if (status == HSEP_REFUSED) {
         hsep_instance_free(instance);
         return NULL;
     }

@@ -70,21 +70,6 @@ static hsep_status values_check_set(const hsep_instance *instance, const hsep_ac
     return HSEP_OK;
 }
 
-/* Have the windows written if one of the variables is of them: nothing else is local. */
-static void values_show(hsep_instance *instance, const hsep_access *access)
-{
-#if HSEP_N_WINDOWS > 0
-    for (size_t i = 0; i < access->n_references; i++) {
-        if (instance->names->find(&instance->context, access->references[i]).row->causality == HSEP_LOCAL) {
-            hsep_model_show_windows(&instance->context, instance->state, instance->values);
-            return;
-        }
-    }
-#else
-    (void)instance, (void)access;
-#endif
-}
-
 /* Calculate what is read: windows, and what follows from the start values before the initialization has ended. Refused
  * if one of the variables is calculated from a start value that is no position. */
 static hsep_status values_prepare(hsep_instance *instance, const hsep_access *access)
@@ -92,7 +77,14 @@ static hsep_status values_prepare(hsep_instance *instance, const hsep_access *ac
     const hsep_fmi_names *names = instance->names;
     char reason[HSEP_MESSAGE_SIZE] = "", name[HSEP_NAME_SIZE];
     if (instance->state != NULL) {
-        values_show(instance, access);
+#if HSEP_N_WINDOWS > 0 /* nothing else is local */
+        for (size_t i = 0; i < access->n_references; i++) {
+            if (names->find(&instance->context, access->references[i]).row->causality == HSEP_LOCAL) {
+                hsep_model_show_windows(&instance->context, instance->state, instance->values);
+                break;
+            }
+        }
+#endif
         return HSEP_OK;
     }
     if (hsep_model_check_start(&instance->context, instance->values, reason) == HSEP_OK) {
