@@ -71,23 +71,9 @@ static int replay(hsep_predictor *predictor, size_t Np, const double *log, size_
 #ifdef AXIS
 #define JOINED(name, part) name##part
 #define OF_AXIS(name, part) JOINED(name, part)
-
-/* Take the axis of the header. */
-static int take_parameters(hsep_parameters *parameters, hsep_mode *mode, char *arguments[])
-{
-    (void)mode;
-    (void)arguments;
-    OF_AXIS(AXIS, _parameters)(parameters);
-    return 1;
-}
-
-enum { N_ARGUMENTS = 1 };
-static const char usage[] = "LOG.csv";
-
+#define USAGE "LOG.csv"
 #else
-static const void *const no_weights = NULL;
-static const size_t no_weights_size = 0;
-#define OF_AXIS(name, part) no##part
+#define USAGE "LOG.csv NP F_N ZETA"
 
 /* Take NP, F_N and ZETA; return whether they are numbers. */
 static int take_parameters(hsep_parameters *parameters, hsep_mode *mode, char *arguments[])
@@ -110,21 +96,25 @@ static int take_parameters(hsep_parameters *parameters, hsep_mode *mode, char *a
     parameters->modes = mode;
     return 1;
 }
-
-enum { N_ARGUMENTS = 4 };
-static const char usage[] = "LOG.csv NP F_N ZETA";
 #endif
 
 int main(int argc, char *argv[])
 {
     size_t n = 0;
-    hsep_mode mode;
     hsep_parameters parameters;
-    if (argc != 1 + N_ARGUMENTS) {
-        fprintf(stderr, "usage: %s %s\n", argv[0], usage);
-        return 2;
-    }
-    if (!take_parameters(&parameters, &mode, argv + 2)) {
+#ifdef AXIS
+    const void *const weights = OF_AXIS(AXIS, _weights);
+    const size_t weights_size = OF_AXIS(AXIS, _weights_size);
+    const int taken = argc == 2;
+    OF_AXIS(AXIS, _parameters)(&parameters);
+#else
+    const void *const weights = NULL;
+    const size_t weights_size = 0;
+    hsep_mode mode;
+    const int taken = argc == 5 && take_parameters(&parameters, &mode, argv + 2);
+#endif
+    if (!taken) {
+        fprintf(stderr, "usage: %s " USAGE "\n", argv[0]);
         return 2;
     }
     const size_t size = hsep_predictor_size(&parameters);
@@ -138,8 +128,7 @@ int main(int argc, char *argv[])
     hsep_predictor *predictor = malloc(size);
     int done = n > 0 && predictor != NULL;
     if (done) {
-        const hsep_began began =
-            hsep_predictor_init(predictor, &parameters, log[0], OF_AXIS(AXIS, _weights), OF_AXIS(AXIS, _weights_size));
+        const hsep_began began = hsep_predictor_init(predictor, &parameters, log[0], weights, weights_size);
         if (began != HSEP_BEGAN) {
             fprintf(
                 stderr, "cold: the weights are %s\n", began == HSEP_WEIGHTS_OTHER ? "of other settings" : "damaged");

@@ -26,32 +26,18 @@ static int calls_place(unsigned bit)
     return place;
 }
 
-static void calls_log(const hsep_instance *instance, hsep_category category, const char *format, va_list arguments)
+HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, const char *format, ...)
 {
     char text[2 * HSEP_MESSAGE_SIZE];
     const int place = calls_place((unsigned)category);
     if (instance->logger == NULL || (instance->categories & (unsigned)category) == 0) {
         return;
     }
+    va_list arguments;
+    va_start(arguments, format);
     (void)hsep_text_list(text, sizeof text, format, arguments);
+    va_end(arguments);
     instance->hand(instance, calls_status[place], calls_categories[place], text);
-}
-
-HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    calls_log(instance, category, format, arguments);
-    va_end(arguments);
-}
-
-HSEP_API hsep_status hsep_refuse(const hsep_instance *instance, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    calls_log(instance, HSEP_LOG_ERROR, format, arguments);
-    va_end(arguments);
-    return HSEP_REFUSED;
 }
 
 HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call)
@@ -73,12 +59,20 @@ HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call)
     return NULL;
 }
 
-/* Check name and token and take the table; why not is logged. */
-static hsep_status calls_open(hsep_instance *instance, const char *name, const char *token, const char *resources)
+HSEP_API hsep_instance *hsep_call_instantiate(
+    const hsep_instance *filled, const char *name, const char *token, const char *resources, int logging_on)
 {
-    const hsep_fmi_names *names = instance->names;
+    const hsep_fmi_names *names = filled->names;
     char message[HSEP_MESSAGE_SIZE] = "";
     hsep_status status = HSEP_REFUSED;
+    hsep_instance *instance = hsep_new(filled, sizeof *instance);
+    if (instance == NULL) {
+        (void)hsep_refuse(
+            filled, "%s: no memory for an instance of %lu bytes", names->instantiate, (unsigned long)sizeof *instance);
+        return NULL;
+    }
+    *instance = *filled;
+    instance->categories = logging_on ? CALLS_LOG_EVERYTHING : CALLS_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
     if (name == NULL || name[0] == '\0') {
         (void)hsep_message_add(message, "%s: instanceName must not be empty", names->instantiate);
     } else {
@@ -92,22 +86,7 @@ static hsep_status calls_open(hsep_instance *instance, const char *name, const c
     if (status != HSEP_OK) {
         hsep_log(instance, status == HSEP_WARNED ? HSEP_LOG_WARNING : HSEP_LOG_ERROR, "%s", message);
     }
-    return status;
-}
-
-HSEP_API hsep_instance *hsep_call_instantiate(
-    const hsep_instance *filled, const char *name, const char *token, const char *resources, int logging_on)
-{
-    hsep_instance *instance = hsep_new(filled, sizeof *instance);
-    if (instance == NULL) {
-        (void)hsep_refuse(
-            filled, "%s: no memory for an instance of %lu bytes", filled->names->instantiate,
-            (unsigned long)sizeof *instance);
-        return NULL;
-    }
-    *instance = *filled;
-    instance->categories = logging_on ? CALLS_LOG_EVERYTHING : CALLS_LOG_EVERYTHING & ~(unsigned)HSEP_LOG_ALL;
-    if (calls_open(instance, name, token, resources) == HSEP_REFUSED) {
+    if (status == HSEP_REFUSED) {
         hsep_instance_free(instance);
         return NULL;
     }
@@ -115,13 +94,10 @@ HSEP_API hsep_instance *hsep_call_instantiate(
     return instance;
 }
 
-HSEP_API hsep_status hsep_call_logging(void *handle, const hsep_call *call, int on, size_t n, const char *const names[])
+HSEP_API hsep_status
+hsep_call_logging(hsep_instance *instance, const hsep_call *call, int on, size_t n, const char *const names[])
 {
-    hsep_instance *instance = hsep_begin(handle, call);
     unsigned named = 0;
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
     if (n > 0 && names == NULL) {
         return hsep_refuse(instance, "%s: categories is NULL, but nCategories is %lu", call->name, (unsigned long)n);
     }
@@ -143,13 +119,9 @@ HSEP_API hsep_status hsep_call_logging(void *handle, const hsep_call *call, int 
     return HSEP_OK;
 }
 
-HSEP_API hsep_status
-hsep_call_experiment(void *handle, const hsep_call *call, double start_time, int has_stop_time, double stop_time)
+HSEP_API hsep_status hsep_call_experiment(
+    hsep_instance *instance, const hsep_call *call, double start_time, int has_stop_time, double stop_time)
 {
-    hsep_instance *instance = hsep_begin(handle, call);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
     if (!isfinite(start_time)) {
         return hsep_refuse(instance, "%s: startTime must be finite, got %g s", call->name, start_time);
     }
@@ -166,23 +138,15 @@ hsep_call_experiment(void *handle, const hsep_call *call, double start_time, int
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_phase(void *handle, const hsep_call *call, hsep_phase phase)
+HSEP_API hsep_status hsep_call_phase(hsep_instance *instance, hsep_phase phase)
 {
-    hsep_instance *instance = hsep_begin(handle, call);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
     instance->experiment.phase = phase;
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_initialise(void *handle, const hsep_call *call)
+HSEP_API hsep_status hsep_call_initialise(hsep_instance *instance, const hsep_call *call)
 {
-    hsep_instance *instance = hsep_begin(handle, call);
     char message[HSEP_MESSAGE_SIZE] = "";
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
     const hsep_status status = hsep_instance_initialise(instance, call->name, message);
     if (status == HSEP_REFUSED) {
         return hsep_refuse(instance, "%s", message);
@@ -196,13 +160,9 @@ HSEP_API hsep_status hsep_call_initialise(void *handle, const hsep_call *call)
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_step(void *handle, const hsep_call *call, double t, double h)
+HSEP_API hsep_status hsep_call_step(hsep_instance *instance, const hsep_call *call, double t, double h)
 {
-    hsep_instance *instance = hsep_begin(handle, call);
     char message[HSEP_MESSAGE_SIZE] = "";
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
     if (instance->experiment.has_stop_time && t >= instance->experiment.stop_time - calls_stop_tolerance * h) {
         return hsep_refuse(
             instance, "%s: a step must begin before the stop time %.9g s, got one from %.9g s", call->name,
@@ -218,15 +178,5 @@ HSEP_API hsep_status hsep_call_step(void *handle, const hsep_call *call, double 
         instance->warned |= (unsigned)status;
         hsep_log(instance, HSEP_LOG_WARNING, "%s: %s", call->name, message);
     }
-    return HSEP_OK;
-}
-
-HSEP_API hsep_status hsep_call_reset(void *handle, const hsep_call *call)
-{
-    hsep_instance *instance = hsep_begin(handle, call);
-    if (instance == NULL) {
-        return HSEP_REFUSED;
-    }
-    hsep_instance_reset(instance);
     return HSEP_OK;
 }

@@ -8,10 +8,7 @@
 #ifndef HSEP_CALLS_H
 #define HSEP_CALLS_H
 
-#include "hsep_api.h"
 #include "hsep_instance.h"
-
-#include <stddef.h>
 
 /* The log categories of modelDescription.xml, one bit each. */
 typedef enum {
@@ -27,6 +24,10 @@ typedef struct {
     const char *name;
     unsigned legal;
 } hsep_call;
+
+/* A row of a version's table of calls is a record, fmi2Reset_call; where it is, with v = fmi2 and function = Reset. */
+#define HSEP_CALL_ROW(function, legal) static const hsep_call function##_call = {#function, legal};
+#define HSEP_CALL(v, function) (&v##function##_call)
 
 /* The phases, short, for the columns of a table of calls. */
 enum {
@@ -45,33 +46,48 @@ HSEP_API hsep_instance *hsep_call_instantiate(
 /* The instance if the call is legal now; otherwise NULL, and why not is logged. */
 HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call);
 
+/* Body of a function of a version: if the call is legal, do an action, which returns a hsep_status, on self. */
+#define HSEP_DO(v, function, handle, action) \
+    const hsep_call *call = HSEP_CALL(v, function); \
+    hsep_instance *self = hsep_begin(handle, call); \
+    return self != NULL && (action) != HSEP_REFUSED ? v##OK : v##Error
+
 /* Hand a message, formatted as printf does, to the importer's logger if its category is on. */
 HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, const char *format, ...);
 
-/* Log an error and return HSEP_REFUSED. */
-HSEP_API hsep_status hsep_refuse(const hsep_instance *instance, const char *format, ...);
+/* Log an error; HSEP_REFUSED. */
+#define hsep_refuse(instance, ...) (hsep_log(instance, HSEP_LOG_ERROR, __VA_ARGS__), (hsep_status)HSEP_REFUSED)
 
-/* With names, only these categories are switched on, or these off; a name that is not ours changes nothing. Without
- * names, on means everything and off the state after instantiation without logging: warnings and errors. */
+/* What calls do once they are legal.
+ *
+ * Logging: with names, only these categories are switched on, or these off; a name that is not ours changes nothing.
+ * Without names, on means everything and off the state after instantiation without logging: warnings and errors. */
 HSEP_API hsep_status
-hsep_call_logging(void *handle, const hsep_call *call, int on, size_t n, const char *const names[]);
+hsep_call_logging(hsep_instance *instance, const hsep_call *call, int on, size_t n, const char *const names[]);
 
 /* Set the experiment, s. */
-HSEP_API hsep_status
-hsep_call_experiment(void *handle, const hsep_call *call, double start_time, int has_stop_time, double stop_time);
+HSEP_API hsep_status hsep_call_experiment(
+    hsep_instance *instance, const hsep_call *call, double start_time, int has_stop_time, double stop_time);
 
 /* Move on to a phase that needs nothing else. */
-HSEP_API hsep_status hsep_call_phase(void *handle, const hsep_call *call, hsep_phase phase);
+HSEP_API hsep_status hsep_call_phase(hsep_instance *instance, hsep_phase phase);
 
 /* End the initialization. */
-HSEP_API hsep_status hsep_call_initialise(void *handle, const hsep_call *call);
+HSEP_API hsep_status hsep_call_initialise(hsep_instance *instance, const hsep_call *call);
 
 /* Do a communication step from t by h, s; the model's warnings are logged once an instance, each kind, not at every
  * step. */
-HSEP_API hsep_status hsep_call_step(void *handle, const hsep_call *call, double t, double h);
+HSEP_API hsep_status hsep_call_step(hsep_instance *instance, const hsep_call *call, double t, double h);
 
-/* As after the instantiation. */
-HSEP_API hsep_status hsep_call_reset(void *handle, const hsep_call *call);
+/* Saved states, hsep_saved.c: a handle is a pointer to one, or NULL. */
+HSEP_API hsep_status hsep_call_save(hsep_instance *instance, const hsep_call *call, void **state);
+HSEP_API hsep_status hsep_call_restore(hsep_instance *instance, const hsep_call *call, void *state);
+HSEP_API hsep_status hsep_call_free_state(hsep_instance *instance, const hsep_call *call, void **state);
+HSEP_API hsep_status hsep_call_state_size(hsep_instance *instance, const hsep_call *call, void *state, size_t *size);
+HSEP_API hsep_status
+hsep_call_serialise(hsep_instance *instance, const hsep_call *call, void *state, void *bytes, size_t size);
+HSEP_API hsep_status
+hsep_call_deserialise(hsep_instance *instance, const hsep_call *call, const void *bytes, size_t size, void **state);
 
 /* What an importer gives to read or write variables by value reference. */
 typedef struct {
@@ -85,98 +101,98 @@ typedef struct {
 
 /* Check that all references are to variables of that type, and that there is a place for each of their values: if one
  * is refused, none is touched. */
-HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep_access *access, char message[]);
+HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep_access *access);
 
-/* The instance if n variables may be read, or set, of a type, as the call's name says: fmi2GetReal; otherwise NULL.
- * Inputs may be set at any time, parameters until the initialization has ended, tunable ones later too. */
-HSEP_API hsep_instance *hsep_call_access(
-    void *handle, const hsep_call *call, const unsigned references[], size_t n, const void *values, size_t n_values);
+/* Check that n variables may be read, or set, of a type, as the call's name says: fmi2GetReal. Inputs may be set at any
+ * time, parameters until the initialization has ended, tunable ones later too. */
+HSEP_API hsep_status hsep_call_access(
+    hsep_instance *instance, const hsep_call *call, const unsigned references[], size_t n, const void *values,
+    size_t n_values);
 
 /* The values of a variable, and their number. */
 HSEP_API const double *hsep_values_source(const hsep_instance *instance, unsigned reference, size_t *count);
 
-/* The instance if a variable may have a value: a parameter is checked when it is set in a run, one that sizes arrays
- * always; before a run the others when the initialization ends. Otherwise NULL. */
-HSEP_API hsep_instance *hsep_call_tune(
-    hsep_instance *instance, const hsep_call *call, unsigned reference, double value);
+/* Check that a variable may have a value: a parameter is checked when it is set in a run, one that sizes arrays always;
+ * before a run the others when the initialization ends. */
+HSEP_API hsep_status
+hsep_call_tune(const hsep_instance *instance, const hsep_call *call, unsigned reference, double value);
 
 /* A value as a whole number of 32 bits. */
 HSEP_API int hsep_values_integer(double number);
 
-/* Bodies of the functions that get and set n variables; self is NULL if they may not. get: the function's value of a
- * double, number; set: the double of its value, number. What is set has one value for each reference, as no array is an
- * input or a parameter. */
-#define HSEP_GET(handle, call, references, n, to, n_values, get) \
-    const hsep_instance *self = hsep_call_access(handle, call, references, n, to, n_values); \
-    for (size_t i = 0; self != NULL && i < n; i++) { \
+/* Begin of a function of a version, v, that gets or sets n variables: it returns if they may not be. */
+#define HSEP_ACCESS(v, function, handle, references, n, values, n_values) \
+    const hsep_call *call = HSEP_CALL(v, function); \
+    hsep_instance *self = hsep_begin(handle, call); \
+    if (self == NULL || hsep_call_access(self, call, references, n, values, n_values) != HSEP_OK) { \
+        return v##Error; \
+    }
+
+/* Bodies of these functions. get: the function's value of a double, number; set: the double of its value, number. What
+ * is set has one value for each reference, as no array is an input or a parameter; if one is refused, none is set. */
+#define HSEP_GET(v, function, handle, references, n, to, n_values, get) \
+    HSEP_ACCESS(v, function, handle, references, n, to, n_values) \
+    for (size_t i = 0; i < n; i++) { \
         size_t count = 0; \
         const double *source = hsep_values_source(self, references[i], &count); \
         while (count-- > 0) { \
             const double number = *source++; \
             *to++ = get; \
         } \
-    }
-
-#define HSEP_SET(handle, call, references, n, from, n_values, type, set) \
-    hsep_instance *self = hsep_call_access(handle, call, references, n, from, n_values); \
-    for (size_t i = 0; self != NULL && i < n; i++) { \
-        const type number = from[i]; \
-        self = hsep_call_tune(self, call, references[i], set); \
     } \
-    for (size_t i = 0; self != NULL && i < n; i++) { \
+    return v##OK
+
+#define HSEP_SET(v, function, handle, references, n, from, n_values, type, set) \
+    HSEP_ACCESS(v, function, handle, references, n, from, n_values) \
+    for (size_t i = 0; i < n; i++) { \
+        const type number = from[i]; \
+        if (hsep_call_tune(self, call, references[i], set) != HSEP_OK) { \
+            return v##Error; \
+        } \
+    } \
+    for (size_t i = 0; i < n; i++) { \
         const type number = from[i]; \
         self->values[references[i]] = set; \
-    }
+    } \
+    return v##OK
 
-/* Saved states, hsep_saved.c: a handle is a pointer to one, or NULL. */
-HSEP_API hsep_status hsep_call_save(void *handle, const hsep_call *call, void **state);
-HSEP_API hsep_status hsep_call_restore(void *handle, const hsep_call *call, void *state);
-HSEP_API hsep_status hsep_call_free_state(void *handle, const hsep_call *call, void **state);
-HSEP_API hsep_status hsep_call_state_size(void *handle, const hsep_call *call, void *state, size_t *size);
-HSEP_API hsep_status hsep_call_serialise(void *handle, const hsep_call *call, void *state, void *bytes, size_t size);
-HSEP_API hsep_status
-hsep_call_deserialise(void *handle, const hsep_call *call, const void *bytes, size_t size, void **state);
-
-/* The functions of a version, v (fmi2), that others have by other names: of a handle's type, v##Handle, of a state's,
- * v##State, whose reading is spelt De (DeSerialize). CALL: what the version's table has of a call. */
-#define HSEP_COMMON_FUNCTIONS(v, Handle, State, De, CALL) \
+/* The functions of a version that others have by other names: of a handle's type, v##Handle, of a state's, v##State,
+ * whose reading is spelt De (DeSerialize). */
+#define HSEP_COMMON_FUNCTIONS(v, Handle, State, De) \
     void v##FreeInstance(v##Handle c) { hsep_instance_free(c); } \
     v##Status v##SetDebugLogging(v##Handle c, v##Boolean on, size_t n, const v##String categories[]) \
     { \
-        return v##_status(hsep_call_logging(c, CALL(v##SetDebugLogging), on, n, categories)); \
+        HSEP_DO(v, SetDebugLogging, c, hsep_call_logging(self, call, on, n, categories)); \
     } \
     v##Status v##ExitInitializationMode(v##Handle c) \
     { \
-        return v##_status(hsep_call_initialise(c, CALL(v##ExitInitializationMode))); \
+        HSEP_DO(v, ExitInitializationMode, c, hsep_call_initialise(self, call)); \
     } \
-    v##Status v##Terminate(v##Handle c) \
-    { \
-        return v##_status(hsep_call_phase(c, CALL(v##Terminate), HSEP_TERMINATED)); \
-    } \
-    v##Status v##Reset(v##Handle c) { return v##_status(hsep_call_reset(c, CALL(v##Reset))); } \
+    v##Status v##Terminate(v##Handle c) { HSEP_DO(v, Terminate, c, hsep_call_phase(self, HSEP_TERMINATED)); } \
+    v##Status v##Reset(v##Handle c) { HSEP_DO(v, Reset, c, (hsep_instance_reset(self), HSEP_OK)); } \
     v##Status v##Get##State(v##Handle c, v##State *state) \
     { \
-        return v##_status(hsep_call_save(c, CALL(v##Get##State), state)); \
+        HSEP_DO(v, Get##State, c, hsep_call_save(self, call, state)); \
     } \
     v##Status v##Set##State(v##Handle c, v##State state) \
     { \
-        return v##_status(hsep_call_restore(c, CALL(v##Set##State), state)); \
+        HSEP_DO(v, Set##State, c, hsep_call_restore(self, call, state)); \
     } \
     v##Status v##Free##State(v##Handle c, v##State *state) \
     { \
-        return v##_status(hsep_call_free_state(c, CALL(v##Free##State), state)); \
+        HSEP_DO(v, Free##State, c, hsep_call_free_state(self, call, state)); \
     } \
     v##Status v##Serialized##State##Size(v##Handle c, v##State state, size_t *size) \
     { \
-        return v##_status(hsep_call_state_size(c, CALL(v##Serialized##State##Size), state, size)); \
+        HSEP_DO(v, Serialized##State##Size, c, hsep_call_state_size(self, call, state, size)); \
     } \
     v##Status v##Serialize##State(v##Handle c, v##State state, v##Byte bytes[], size_t size) \
     { \
-        return v##_status(hsep_call_serialise(c, CALL(v##Serialize##State), state, bytes, size)); \
+        HSEP_DO(v, Serialize##State, c, hsep_call_serialise(self, call, state, bytes, size)); \
     } \
     v##Status v##De##State(v##Handle c, const v##Byte bytes[], size_t size, v##State *state) \
     { \
-        return v##_status(hsep_call_deserialise(c, CALL(v##De##State), bytes, size, state)); \
+        HSEP_DO(v, De##State, c, hsep_call_deserialise(self, call, bytes, size, state)); \
     }
 
 #endif

@@ -1,7 +1,6 @@
 #include "hsep_instance.h"
 
 #include "hsep_check.h"
-#include "hsep_table.h"
 
 #include <string.h>
 

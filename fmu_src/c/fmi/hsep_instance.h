@@ -7,9 +7,7 @@
 #ifndef HSEP_INSTANCE_H
 #define HSEP_INSTANCE_H
 
-#include "hsep_api.h"
 #include "hsep_fmu.h"
-#include "hsep_layout.h"
 #include "hsep_table.h"
 
 #include <stddef.h>
@@ -42,7 +40,7 @@ typedef struct {
     size_t (*n_variables)(const hsep_context *context);
     /* the variable of one of them, */
     hsep_found (*find)(const hsep_context *context, size_t reference);
-    /* and its name, in text. */
+    /* and its name, as hsep_table_name. */
     const char *(*name)(const hsep_context *context, size_t reference, char text[HSEP_NAME_SIZE]);
 } hsep_fmi_names;
 

@@ -108,11 +108,7 @@ static char *opening_beside(const hsep_instance *instance)
         return NULL;
     }
     size_t end = strlen(path);
-#ifdef _WIN32
-    while (end > 0 && path[end - 1] != '/' && path[end - 1] != '\\') {
-#else
-    while (end > 0 && path[end - 1] != '/') {
-#endif
+    while (end > 0 && path[end - 1] != '/' && !(OPENING_WINDOWS && path[end - 1] == '\\')) {
         end--;
     }
     char *folder = hsep_new(instance, end + sizeof OPENING_UP);
@@ -143,7 +139,6 @@ HSEP_ASSERT_WORDS(opening_table, 12);
 /* Check a table of size bytes, and fill the context with what it tells. reason: what is wrong with it. */
 static hsep_status opening_fill(hsep_context *context, const opening_table *table, size_t size, char reason[])
 {
-    uint64_t sum = 0;
     if (size < sizeof *table || memcmp(table->magic, "HSEPVAR2", sizeof table->magic) != 0) {
         return hsep_message_add(reason, "it is no such file");
     }
@@ -157,8 +152,7 @@ static hsep_status opening_fill(hsep_context *context, const opening_table *tabl
         !modes_fit || table->angular > 1 || table->guid[HSEP_GUID_SIZE - 1] != '\0') {
         return hsep_message_add(reason, "it is damaged or truncated");
     }
-    memcpy(&sum, (const char *)table + size - sizeof sum, sizeof sum);
-    if (sum != hsep_crc(table, size - sizeof sum)) {
+    if (!hsep_is_sealed(table, size)) {
         return hsep_message_add(reason, "it is damaged: the checksum differs");
     }
     *context = (hsep_context){

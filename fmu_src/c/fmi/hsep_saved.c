@@ -39,25 +39,20 @@ typedef struct {
     double values[]; /* then the model's state, aligned for double */
 } hsep_saved;
 
-/* The instance if the call is legal and the handle is a saved state; otherwise NULL, with a message. */
-static hsep_instance *saved_begin(void *handle, const hsep_call *call, const hsep_saved *saved)
+/* Check that a handle is a saved state. */
+static hsep_status saved_check(const hsep_instance *instance, const hsep_call *call, const hsep_saved *saved)
 {
-    hsep_instance *instance = hsep_begin(handle, call);
-    if (instance != NULL && saved == NULL) {
-        (void)hsep_refuse(instance, "%s: the state is NULL", call->name);
-        return NULL;
+    if (saved == NULL) {
+        return hsep_refuse(instance, "%s: the state is NULL", call->name);
     }
-    if (instance != NULL && memcmp(saved->magic, SAVED_MAGIC, sizeof saved->magic) != 0) {
-        (void)hsep_refuse(instance, "%s: the state is none of this FMU", call->name);
-        return NULL;
-    }
-    return instance;
+    const int is_ours = memcmp(saved->magic, SAVED_MAGIC, sizeof saved->magic) == 0;
+    return is_ours ? HSEP_OK : hsep_refuse(instance, "%s: the state is none of this FMU", call->name);
 }
 
 /* The same where a place for a handle is given, which may hold none. */
-static hsep_instance *saved_begin_place(void *handle, const hsep_call *call, void **place)
+static hsep_status saved_check_place(const hsep_instance *instance, const hsep_call *call, void **place)
 {
-    return place != NULL && *place != NULL ? saved_begin(handle, call, *place) : hsep_begin(handle, call);
+    return place == NULL || *place == NULL ? HSEP_OK : saved_check(instance, call, *place);
 }
 
 static void saved_free(hsep_saved *saved)
@@ -95,10 +90,9 @@ static size_t saved_fixed_size(const hsep_instance *instance)
     return sizeof(saved_header) + hsep_instance_n_values(instance) * sizeof(double);
 }
 
-HSEP_API hsep_status hsep_call_save(void *handle, const hsep_call *call, void **state)
+HSEP_API hsep_status hsep_call_save(hsep_instance *instance, const hsep_call *call, void **state)
 {
-    hsep_instance *instance = saved_begin_place(handle, call, state);
-    if (instance == NULL) {
+    if (saved_check_place(instance, call, state) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (state == NULL) {
@@ -128,11 +122,10 @@ HSEP_API hsep_status hsep_call_save(void *handle, const hsep_call *call, void **
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_restore(void *handle, const hsep_call *call, void *state)
+HSEP_API hsep_status hsep_call_restore(hsep_instance *instance, const hsep_call *call, void *state)
 {
     const hsep_saved *saved = state;
-    hsep_instance *instance = saved_begin(handle, call, saved);
-    if (instance == NULL) {
+    if (saved_check(instance, call, saved) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     const size_t n = hsep_instance_n_values(instance), size = (size_t)saved->header.state_size;
@@ -163,9 +156,9 @@ HSEP_API hsep_status hsep_call_restore(void *handle, const hsep_call *call, void
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_free_state(void *handle, const hsep_call *call, void **state)
+HSEP_API hsep_status hsep_call_free_state(hsep_instance *instance, const hsep_call *call, void **state)
 {
-    if (saved_begin_place(handle, call, state) == NULL) {
+    if (saved_check_place(instance, call, state) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (state != NULL) { /* the standard: freeing nothing is fine */
@@ -174,11 +167,10 @@ HSEP_API hsep_status hsep_call_free_state(void *handle, const hsep_call *call, v
     return HSEP_OK;
 }
 
-HSEP_API hsep_status hsep_call_state_size(void *handle, const hsep_call *call, void *state, size_t *size)
+HSEP_API hsep_status hsep_call_state_size(hsep_instance *instance, const hsep_call *call, void *state, size_t *size)
 {
     const hsep_saved *saved = state;
-    hsep_instance *instance = saved_begin(handle, call, saved);
-    if (instance == NULL) {
+    if (saved_check(instance, call, saved) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (size == NULL) {
@@ -197,11 +189,11 @@ static uint64_t saved_checksum(const hsep_saved *saved)
            hsep_crc(saved->values, (size_t)header.size - sizeof header);
 }
 
-HSEP_API hsep_status hsep_call_serialise(void *handle, const hsep_call *call, void *state, void *bytes, size_t size)
+HSEP_API hsep_status
+hsep_call_serialise(hsep_instance *instance, const hsep_call *call, void *state, void *bytes, size_t size)
 {
     const hsep_saved *saved = state;
-    hsep_instance *instance = saved_begin(handle, call, saved);
-    if (instance == NULL) {
+    if (saved_check(instance, call, saved) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     const size_t needed = (size_t)saved->header.size;
@@ -250,11 +242,10 @@ static const char *saved_fault(const hsep_instance *instance, const hsep_saved *
 }
 
 HSEP_API hsep_status
-hsep_call_deserialise(void *handle, const hsep_call *call, const void *bytes, size_t size, void **state)
+hsep_call_deserialise(hsep_instance *instance, const hsep_call *call, const void *bytes, size_t size, void **state)
 {
     char message[HSEP_MESSAGE_SIZE] = "";
-    hsep_instance *instance = saved_begin_place(handle, call, state);
-    if (instance == NULL) {
+    if (saved_check_place(instance, call, state) != HSEP_OK) {
         return HSEP_REFUSED;
     }
     if (bytes == NULL || state == NULL) {

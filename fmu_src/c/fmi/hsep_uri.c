@@ -1,7 +1,6 @@
 /* RFC 8089 file URIs as importers write them: file:///a/b, file:/a/b, file://localhost/a/b, file:///C:/a/b. */
 #include "hsep_uri.h"
 
-#include <stddef.h>
 #include <string.h>
 
 /* Whether text begins with prefix, which is written in lower case. */

@@ -1,8 +1,45 @@
 /* FMI 2.0 for co-simulation. A value reference is the place of one value; every number comes from the model. */
+#include "hsep_calls.h" /* before the importer's header: it names FMI2_FUNCTION_PREFIX */
 #include "hsep_check.h"
-#include "hsep_fmi2_calls.h"
+
+#include "fmi2Functions.h"
 
 #include <math.h>
+
+/* The calls that belong to an instance: CALL(function, states in which it is legal); the standard's table of the
+ * co-simulation state machine.
+ * I: instantiated, M: Initialization Mode, S: stepping, T: terminated */
+/* clang-format off */
+#define HSEP_FMI2_ACCESS(CALL, type) \
+    CALL(fmi2Get##type,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi2Set##type,                HSEP_I | HSEP_M | HSEP_S)
+#define HSEP_FMI2_CALLS(CALL) \
+    CALL(fmi2SetDebugLogging,          HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi2SetupExperiment,          HSEP_I) \
+    CALL(fmi2EnterInitializationMode,  HSEP_I) \
+    CALL(fmi2ExitInitializationMode,            HSEP_M) \
+    CALL(fmi2Terminate,                                  HSEP_S) \
+    CALL(fmi2Reset,                    HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    HSEP_FMI2_ACCESS(CALL, Real) HSEP_FMI2_ACCESS(CALL, Integer) \
+    HSEP_FMI2_ACCESS(CALL, Boolean) HSEP_FMI2_ACCESS(CALL, String) \
+    CALL(fmi2GetFMUstate,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi2SetFMUstate,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi2FreeFMUstate,             HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi2SerializedFMUstateSize,   HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi2SerializeFMUstate,        HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi2DeSerializeFMUstate,      HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi2GetDirectionalDerivative,          HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi2SetRealInputDerivatives,  HSEP_I | HSEP_M | HSEP_S) \
+    CALL(fmi2GetRealOutputDerivatives,                   HSEP_S | HSEP_T) \
+    CALL(fmi2DoStep,                                     HSEP_S) \
+    CALL(fmi2CancelStep,               0) \
+    CALL(fmi2GetStatus,                                  HSEP_S | HSEP_T) \
+    CALL(fmi2GetRealStatus,                              HSEP_S | HSEP_T) \
+    CALL(fmi2GetIntegerStatus,                           HSEP_S | HSEP_T) \
+    CALL(fmi2GetBooleanStatus,                           HSEP_S | HSEP_T) \
+    CALL(fmi2GetStringStatus,                            HSEP_S | HSEP_T)
+/* clang-format on */
+HSEP_FMI2_CALLS(HSEP_CALL_ROW)
 
 static size_t fmi2_n_variables(const hsep_context *context) { return context->n_variables; }
 
@@ -76,20 +113,19 @@ fmi2Component fmi2Instantiate(
     return hsep_call_instantiate(&filled, instanceName, fmuGUID, fmuResourceLocation, loggingOn);
 }
 
-HSEP_COMMON_FUNCTIONS(fmi2, Component, FMUstate, DeSerialize, HSEP_FMI2)
+HSEP_COMMON_FUNCTIONS(fmi2, Component, FMUstate, DeSerialize)
 
 fmi2Status fmi2SetupExperiment(
     fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime, fmi2Boolean stopTimeDefined,
     fmi2Real stopTime)
 {
-    (void)toleranceDefined;
-    (void)tolerance;
-    return fmi2_status(hsep_call_experiment(c, HSEP_FMI2(fmi2SetupExperiment), startTime, stopTimeDefined, stopTime));
+    (void)toleranceDefined, (void)tolerance;
+    HSEP_DO(fmi2, SetupExperiment, c, hsep_call_experiment(self, call, startTime, stopTimeDefined, stopTime));
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    return fmi2_status(hsep_call_phase(c, HSEP_FMI2(fmi2EnterInitializationMode), HSEP_INITIALIZATION));
+    HSEP_DO(fmi2, EnterInitializationMode, c, hsep_call_phase(self, HSEP_INITIALIZATION));
 }
 
 fmi2Status fmi2DoStep(
@@ -97,20 +133,18 @@ fmi2Status fmi2DoStep(
     fmi2Boolean noSetFMUStatePriorToCurrentPoint)
 {
     (void)noSetFMUStatePriorToCurrentPoint;
-    return fmi2_status(hsep_call_step(c, HSEP_FMI2(fmi2DoStep), currentCommunicationPoint, communicationStepSize));
+    HSEP_DO(fmi2, DoStep, c, hsep_call_step(self, call, currentCommunicationPoint, communicationStepSize));
 }
 
 /* Variables. A call is checked as a whole first: if one is refused, none is touched. */
 #define FMI2_ACCESS(type, get, set) \
     fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##type value[]) \
     { \
-        HSEP_GET(c, &hsep_fmi2_calls[HSEP_FMI2_fmi2Get##type], vr, nvr, value, nvr, get) \
-        return (self == NULL) ? fmi2Error : fmi2OK; \
+        HSEP_GET(fmi2, Get##type, c, vr, nvr, value, nvr, get); \
     } \
     fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2##type value[]) \
     { \
-        HSEP_SET(c, &hsep_fmi2_calls[HSEP_FMI2_fmi2Set##type], vr, nvr, value, nvr, fmi2##type, set) \
-        return (self == NULL) ? fmi2Error : fmi2OK; \
+        HSEP_SET(fmi2, Set##type, c, vr, nvr, value, nvr, fmi2##type, set); \
     }
 
 FMI2_ACCESS(Real, number, number)
@@ -120,87 +154,68 @@ FMI2_ACCESS(Boolean, number != 0.0, number ? 1.0 : 0.0)
 /* There are no variables of type String: with references, the access is refused by name. */
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
 {
-    return hsep_call_access(c, HSEP_FMI2(fmi2GetString), vr, nvr, value, nvr) == NULL ? fmi2Error : fmi2OK;
+    HSEP_DO(fmi2, GetString, c, hsep_call_access(self, call, vr, nvr, value, nvr));
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
 {
-    return hsep_call_access(c, HSEP_FMI2(fmi2SetString), vr, nvr, value, nvr) == NULL ? fmi2Error : fmi2OK;
+    HSEP_DO(fmi2, SetString, c, hsep_call_access(self, call, vr, nvr, value, nvr));
 }
 
-/* Check that inputs may have these derivatives. */
-static hsep_status fmi2_check_derivatives(
-    const hsep_instance *instance, const hsep_access *access, const fmi2Integer order[], const fmi2Real value[],
-    char message[])
+/* The derivatives count only for the next step. Like the values, none is taken if one is refused. */
+static hsep_status fmi2_set_derivatives(
+    hsep_instance *instance, const hsep_access *access, const fmi2Integer order[], const fmi2Real value[])
 {
+    const size_t n = access->n_references;
     char input[HSEP_NAME_SIZE];
+    if (hsep_values_check(instance, access) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
     if (HSEP_N_INTERPOLATED == 0) {
-        return hsep_message_add(
-            message, "%s is not supported: canInterpolateInputs is false in modelDescription.xml", access->call);
+        return hsep_refuse(
+            instance, "%s is not supported: canInterpolateInputs is false in modelDescription.xml", access->call);
     }
-    if (access->n_references > 0 && order == NULL) {
-        return hsep_message_add(
-            message, "%s: order is NULL, but nvr is %lu", access->call, (unsigned long)access->n_references);
+    if (n > 0 && order == NULL) {
+        return hsep_refuse(instance, "%s: order is NULL, but nvr is %lu", access->call, (unsigned long)n);
     }
-    for (size_t i = 0; i < access->n_references; i++) {
+    for (size_t i = 0; i < n; i++) {
         const char *name = hsep_table_name(&instance->context, access->references[i], input);
         if (access->references[i] + 1 > HSEP_N_INTERPOLATED) {
-            return hsep_message_add(
-                message, "%s: %s takes no derivative, only x_d_ahead and x_meas do", access->call, name);
+            return hsep_refuse(
+                instance, "%s: %s takes no derivative, only x_d_ahead and x_meas do", access->call, name);
         }
         if (order[i] != 1) {
-            return hsep_message_add(
-                message, "%s: the order of %s must be 1, got %d", access->call, name, (int)order[i]);
+            return hsep_refuse(instance, "%s: the order of %s must be 1, got %d", access->call, name, (int)order[i]);
         }
         if (!isfinite(value[i])) {
-            return hsep_message_add(
-                message, "%s: the derivative of %s must be finite, got %g", access->call, name, value[i]);
+            return hsep_refuse(
+                instance, "%s: the derivative of %s must be finite, got %g", access->call, name, value[i]);
         }
+    }
+    for (size_t i = 0; i < n; i++) {
+        instance->values[instance->context.n_variables + access->references[i]] = value[i];
     }
     return HSEP_OK;
 }
 
-/* The derivatives count only for the next step. Like the values, none is taken if one is refused. */
 fmi2Status fmi2SetRealInputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], const fmi2Real value[])
 {
-    const hsep_call *call = HSEP_FMI2(fmi2SetRealInputDerivatives);
-    const hsep_access access = {call->name, "Real", vr, nvr, value, nvr};
-    hsep_instance *instance = hsep_begin(c, call);
-    char message[HSEP_MESSAGE_SIZE] = "";
-    if (instance == NULL) {
-        return fmi2Error;
-    }
-    if (hsep_values_check(instance, &access, message) != HSEP_OK ||
-        fmi2_check_derivatives(instance, &access, order, value, message) != HSEP_OK) {
-        return fmi2_status(hsep_refuse(instance, "%s", message));
-    }
-    for (size_t i = 0; i < nvr; i++) {
-        instance->values[instance->context.n_variables + vr[i]] = value[i];
-    }
-    return fmi2OK;
+    const hsep_access access = {"fmi2SetRealInputDerivatives", "Real", vr, nvr, value, nvr};
+    HSEP_DO(fmi2, SetRealInputDerivatives, c, fmi2_set_derivatives(self, &access, order, value));
 }
 
-fmi2Status fmi2CancelStep(fmi2Component c)
-{
-    (void)hsep_begin(c, HSEP_FMI2(fmi2CancelStep));
-    return fmi2Error;
-}
+fmi2Status fmi2CancelStep(fmi2Component c) { HSEP_DO(fmi2, CancelStep, c, HSEP_REFUSED); }
 
-static fmi2Status fmi2_unsupported(fmi2Component c, const hsep_call *call, const char *capability)
-{
-    hsep_instance *instance = hsep_begin(c, call);
-    if (instance != NULL) {
-        (void)hsep_refuse(instance, "%s is not supported: %s in modelDescription.xml", call->name, capability);
-    }
-    return fmi2Error;
-}
+/* Refuse a call for what modelDescription.xml says. */
+#define FMI2_ABSENT(function, why) \
+    HSEP_DO(fmi2, function, c, hsep_refuse(self, "%s is not supported: %s in modelDescription.xml", call->name, why))
 
 fmi2Status fmi2GetRealOutputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], fmi2Real value[])
 {
     (void)vr, (void)nvr, (void)order, (void)value;
-    return fmi2_unsupported(c, HSEP_FMI2(fmi2GetRealOutputDerivatives), "maxOutputDerivativeOrder is 0");
+    FMI2_ABSENT(GetRealOutputDerivatives, "maxOutputDerivativeOrder is 0");
 }
 
 fmi2Status fmi2GetDirectionalDerivative(
@@ -208,33 +223,35 @@ fmi2Status fmi2GetDirectionalDerivative(
     size_t nKnown, const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 {
     (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
-    return fmi2_unsupported(c, HSEP_FMI2(fmi2GetDirectionalDerivative), "providesDirectionalDerivative is false");
+    FMI2_ABSENT(GetDirectionalDerivative, "providesDirectionalDerivative is false");
 }
 
 /* The functions that get a status: whether that one, s, is known, and its value. */
 #define FMI2_STATUS(function, type, known, answer) \
-    fmi2Status function(fmi2Component c, const fmi2StatusKind s, type *value) \
+    fmi2Status fmi2##function(fmi2Component c, const fmi2StatusKind s, type *value) \
     { \
-        hsep_instance *instance = hsep_begin(c, &hsep_fmi2_calls[HSEP_FMI2_##function]); \
+        const hsep_call *call = HSEP_CALL(fmi2, function); \
+        hsep_instance *self = hsep_begin(c, call); \
         (void)s; \
-        if (instance == NULL) { \
+        if (self == NULL) { \
             return fmi2Error; \
         } \
         if (value == NULL) { \
-            return fmi2_status(hsep_refuse(instance, #function ": value is NULL")); \
+            (void)hsep_refuse(self, "%s: value is NULL", call->name); \
+            return fmi2Error; \
         } \
         if (!(known)) { \
             hsep_log( \
-                instance, HSEP_LOG_DISCARD, \
-                #function ": this status does not exist, because no step is ever pending"); \
+                self, HSEP_LOG_DISCARD, "%s: this status does not exist, because no step is ever pending", \
+                call->name); \
             return fmi2Discard; \
         } \
         *value = answer; \
         return fmi2OK; \
     }
 
-FMI2_STATUS(fmi2GetStatus, fmi2Status, 0, fmi2OK)
-FMI2_STATUS(fmi2GetRealStatus, fmi2Real, s == fmi2LastSuccessfulTime, instance->experiment.time)
-FMI2_STATUS(fmi2GetIntegerStatus, fmi2Integer, 0, 0)
-FMI2_STATUS(fmi2GetBooleanStatus, fmi2Boolean, s == fmi2Terminated, fmi2False)
-FMI2_STATUS(fmi2GetStringStatus, fmi2String, 0, NULL)
+FMI2_STATUS(GetStatus, fmi2Status, 0, fmi2OK)
+FMI2_STATUS(GetRealStatus, fmi2Real, s == fmi2LastSuccessfulTime, self->experiment.time)
+FMI2_STATUS(GetIntegerStatus, fmi2Integer, 0, 0)
+FMI2_STATUS(GetBooleanStatus, fmi2Boolean, s == fmi2Terminated, fmi2False)
+FMI2_STATUS(GetStringStatus, fmi2String, 0, NULL)

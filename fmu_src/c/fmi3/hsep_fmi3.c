@@ -1,10 +1,42 @@
-/* FMI 3.0 for co-simulation: names, instances, experiments, steps and saved states. Every number comes from the model.
+/* FMI 3.0 for co-simulation. Every number comes from the model.
  *
  * Single variables and modes have a value reference for each value, windows one each, then comes the time. Where there
  * are windows, Np is the structural parameter that sizes them.
  */
-#include "hsep_fmi3_calls.h"
-#include "hsep_text.h"
+#include "hsep_calls.h" /* before the importer's header: it names FMI3_FUNCTION_PREFIX */
+
+#include "fmi3Functions.h"
+
+/* The calls that belong to an instance: CALL(function, states in which it is legal); the standard's table of the
+ * co-simulation state machine, without Event Mode, as modelDescription.xml says (hsep_fmi3_absent.c).
+ * I: instantiated, C: Configuration Mode, M: Initialization Mode, S: Step Mode, T: terminated */
+/* clang-format off */
+#define HSEP_FMI3_ACCESS(CALL, type) \
+    CALL(fmi3Get##type,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi3Set##type,                HSEP_I | HSEP_M | HSEP_S)
+#define HSEP_FMI3_CALLS(CALL) \
+    CALL(fmi3SetDebugLogging,          HSEP_I | HSEP_C | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi3EnterConfigurationMode,   HSEP_I) \
+    CALL(fmi3ExitConfigurationMode,             HSEP_C) \
+    CALL(fmi3EnterInitializationMode,  HSEP_I) \
+    CALL(fmi3ExitInitializationMode,                     HSEP_M) \
+    CALL(fmi3Terminate,                                           HSEP_S) \
+    CALL(fmi3Reset,                    HSEP_I | HSEP_C | HSEP_M | HSEP_S | HSEP_T) \
+    HSEP_FMI3_ACCESS(CALL, Float32) HSEP_FMI3_ACCESS(CALL, Float64) HSEP_FMI3_ACCESS(CALL, Boolean) \
+    HSEP_FMI3_ACCESS(CALL, Int8)    HSEP_FMI3_ACCESS(CALL, Int16)   HSEP_FMI3_ACCESS(CALL, Int32) \
+    HSEP_FMI3_ACCESS(CALL, UInt8)   HSEP_FMI3_ACCESS(CALL, UInt16)  HSEP_FMI3_ACCESS(CALL, UInt32) \
+    HSEP_FMI3_ACCESS(CALL, Int64)   HSEP_FMI3_ACCESS(CALL, String)  HSEP_FMI3_ACCESS(CALL, Binary) \
+    CALL(fmi3GetUInt64,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi3SetUInt64,                HSEP_I | HSEP_C) \
+    CALL(fmi3GetFMUState,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi3SetFMUState,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi3FreeFMUState,             HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi3SerializedFMUStateSize,   HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi3SerializeFMUState,        HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi3DeserializeFMUState,      HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
+    CALL(fmi3DoStep,                                              HSEP_S)
+/* clang-format on */
+HSEP_FMI3_CALLS(HSEP_CALL_ROW)
 
 static size_t fmi3_n_windows(const hsep_context *context) { return context->window > 0 ? HSEP_N_WINDOWS : 0; }
 
@@ -35,11 +67,8 @@ static hsep_found fmi3_find(const hsep_context *context, size_t reference)
 
 static const char *fmi3_name(const hsep_context *context, size_t reference, char text[HSEP_NAME_SIZE])
 {
-    if (reference < hsep_table_n_starts(context)) {
-        return hsep_table_name(context, reference, text);
-    }
-    hsep_text(text, HSEP_NAME_SIZE, "%.60s", fmi3_find(context, reference).row->name);
-    return text;
+    const int is_single = reference < hsep_table_n_starts(context);
+    return is_single ? hsep_table_name(context, reference, text) : fmi3_find(context, reference).row->name;
 }
 
 static const hsep_fmi_names fmi3_names = {
@@ -105,33 +134,32 @@ fmi3Instance fmi3InstantiateCoSimulation(
     return hsep_call_instantiate(&filled, instanceName, instantiationToken, resourcePath, loggingOn);
 }
 
-HSEP_COMMON_FUNCTIONS(fmi3, Instance, FMUState, Deserialize, HSEP_FMI3)
+HSEP_COMMON_FUNCTIONS(fmi3, Instance, FMUState, Deserialize)
 
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
 {
-    hsep_instance *self = hsep_begin(instance, HSEP_FMI3(fmi3EnterConfigurationMode));
-    if (self != NULL && self->context.window == 0) {
-        return fmi3_status(
-            hsep_refuse(self, "fmi3EnterConfigurationMode: there is no structural parameter in modelDescription.xml"));
-    }
-    return fmi3_status(hsep_call_phase(instance, HSEP_FMI3(fmi3EnterConfigurationMode), HSEP_CONFIGURATION));
+    HSEP_DO(
+        fmi3, EnterConfigurationMode, instance,
+        self->context.window > 0
+            ? hsep_call_phase(self, HSEP_CONFIGURATION)
+            : hsep_refuse(self, "%s: there is no structural parameter in modelDescription.xml", call->name));
 }
 
 fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance)
 {
-    return fmi3_status(hsep_call_phase(instance, HSEP_FMI3(fmi3ExitConfigurationMode), HSEP_INSTANTIATED));
+    HSEP_DO(fmi3, ExitConfigurationMode, instance, hsep_call_phase(self, HSEP_INSTANTIATED));
 }
 
 fmi3Status fmi3EnterInitializationMode(
     fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance, fmi3Float64 startTime,
     fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
-    const hsep_call *call = HSEP_FMI3(fmi3EnterInitializationMode);
     (void)toleranceDefined, (void)tolerance;
-    if (hsep_call_experiment(instance, call, startTime, stopTimeDefined, stopTime) != HSEP_OK) {
-        return fmi3Error;
-    }
-    return fmi3_status(hsep_call_phase(instance, call, HSEP_INITIALIZATION));
+    HSEP_DO(
+        fmi3, EnterInitializationMode, instance,
+        hsep_call_experiment(self, call, startTime, stopTimeDefined, stopTime) == HSEP_OK
+            ? hsep_call_phase(self, HSEP_INITIALIZATION)
+            : HSEP_REFUSED);
 }
 
 fmi3Status fmi3DoStep(
@@ -139,7 +167,7 @@ fmi3Status fmi3DoStep(
     fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
     fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
 {
-    const hsep_call *call = HSEP_FMI3(fmi3DoStep);
+    const hsep_call *call = HSEP_CALL(fmi3, DoStep);
     hsep_instance *self = hsep_begin(instance, call);
     (void)noSetFMUStatePriorToCurrentPoint;
     if (self == NULL) {
@@ -147,10 +175,88 @@ fmi3Status fmi3DoStep(
     }
     if (eventHandlingNeeded == NULL || terminateSimulation == NULL || earlyReturn == NULL ||
         lastSuccessfulTime == NULL) {
-        return fmi3_status(hsep_refuse(self, "fmi3DoStep: a place for what it returns is NULL"));
+        (void)hsep_refuse(self, "fmi3DoStep: a place for what it returns is NULL");
+        return fmi3Error;
     }
-    const hsep_status status = hsep_call_step(instance, call, currentCommunicationPoint, communicationStepSize);
+    const hsep_status status = hsep_call_step(self, call, currentCommunicationPoint, communicationStepSize);
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = self->experiment.time;
-    return fmi3_status(status);
+    return status == HSEP_OK ? fmi3OK : fmi3Error;
+}
+
+/* Reading and writing variables. A call is checked as a whole first: if one variable is refused, none is touched. */
+#define FMI3_GET(type, get) \
+    fmi3Status fmi3Get##type( \
+        fmi3Instance instance, const fmi3ValueReference references[], size_t n, fmi3##type values[], size_t n_values) \
+    { \
+        HSEP_GET(fmi3, Get##type, instance, references, n, values, n_values, get); \
+    }
+
+#define FMI3_ACCESS(type, get, set) \
+    FMI3_GET(type, get) \
+    fmi3Status fmi3Set##type( \
+        fmi3Instance instance, const fmi3ValueReference references[], size_t n, const fmi3##type values[], \
+        size_t n_values) \
+    { \
+        HSEP_SET(fmi3, Set##type, instance, references, n, values, n_values, fmi3##type, set); \
+    }
+
+FMI3_ACCESS(Float64, number, number)
+FMI3_ACCESS(Int32, hsep_values_integer(number), (double)number)
+FMI3_ACCESS(Int64, hsep_values_integer(number), (double)number)
+FMI3_ACCESS(Boolean, number != 0.0, number ? 1.0 : 0.0)
+FMI3_GET(UInt64, (fmi3UInt64)number)
+
+/* Only Np is of this type: arrays take their new size at once, in Configuration Mode, or as soon as the instance is
+ * there, for importers that know no Configuration Mode. */
+fmi3Status fmi3SetUInt64(
+    fmi3Instance instance, const fmi3ValueReference references[], size_t n, const fmi3UInt64 values[], size_t n_values)
+{
+    HSEP_ACCESS(fmi3, SetUInt64, instance, references, n, values, n_values)
+    char message[HSEP_MESSAGE_SIZE] = "";
+    for (size_t i = 0; i < n; i++) {
+        if (hsep_call_tune(self, call, references[i], (double)values[i]) != HSEP_OK) {
+            return fmi3Error;
+        }
+    }
+    if (n > 0 && hsep_instance_resize(self, call->name, (size_t)values[n - 1], message) != HSEP_OK) {
+        (void)hsep_refuse(self, "%s", message);
+        return fmi3Error;
+    }
+    return fmi3OK;
+}
+
+/* Access to types that no variable has: with references, it is refused by name. */
+#define FMI3_REFUSED(name, c_type) \
+    fmi3Status fmi3##name( \
+        fmi3Instance instance, const fmi3ValueReference references[], size_t n, c_type values[], size_t n_values) \
+    { \
+        HSEP_DO(fmi3, name, instance, hsep_call_access(self, call, references, n, values, n_values)); \
+    }
+#define FMI3_NO_VARIABLE(type) \
+    FMI3_REFUSED(Get##type, fmi3##type) \
+    FMI3_REFUSED(Set##type, const fmi3##type)
+
+FMI3_NO_VARIABLE(Float32)
+FMI3_NO_VARIABLE(Int8)
+FMI3_NO_VARIABLE(UInt8)
+FMI3_NO_VARIABLE(Int16)
+FMI3_NO_VARIABLE(UInt16)
+FMI3_NO_VARIABLE(UInt32)
+FMI3_NO_VARIABLE(String)
+
+fmi3Status fmi3GetBinary(
+    fmi3Instance instance, const fmi3ValueReference references[], size_t n, size_t sizes[], fmi3Binary values[],
+    size_t n_values)
+{
+    (void)sizes;
+    HSEP_DO(fmi3, GetBinary, instance, hsep_call_access(self, call, references, n, values, n_values));
+}
+
+fmi3Status fmi3SetBinary(
+    fmi3Instance instance, const fmi3ValueReference references[], size_t n, const size_t sizes[],
+    const fmi3Binary values[], size_t n_values)
+{
+    (void)sizes;
+    HSEP_DO(fmi3, SetBinary, instance, hsep_call_access(self, call, references, n, values, n_values));
 }

@@ -106,7 +106,7 @@ HSEP_API hsep_status hsep_check_position(
     const hsep_context *context, const char *name, double value, const char *where, double at, char message[])
 {
     const double most = check_position_max[context->angular != 0];
-    char number[HSEP_NUMBER_SIZE], end[HSEP_NUMBER_SIZE];
+    char end[HSEP_NUMBER_SIZE];
     if (fabs(value) <= most) {
         return HSEP_OK;
     }
@@ -116,7 +116,7 @@ HSEP_API hsep_status hsep_check_position(
             message, "%s must be within " HSEP_PLUS_MINUS "%g %s, got %g%s", name, most, context->angular ? "rad" : "m",
             value, end);
     } else {
-        hsep_message_add(message, "%s must be finite, got %s%s", name, hsep_number(number, value, HSEP_REAL), end);
+        hsep_message_add(message, "%s must be finite, got %s%s", name, HSEP_SHOWN(value), end);
     }
     return HSEP_REFUSED;
 }
@@ -145,12 +145,10 @@ HSEP_API hsep_status hsep_check_memory(size_t needed, size_t size, char message[
 
 HSEP_API hsep_status hsep_check_start_time(double t_start, char message[])
 {
-    char number[HSEP_NUMBER_SIZE];
     if (isfinite(t_start)) {
         return HSEP_OK;
     }
-    return hsep_message_add(
-        message, "the start time must be finite, got %s s", hsep_number(number, t_start, HSEP_REAL));
+    return hsep_message_add(message, "the start time must be finite, got %s s", HSEP_SHOWN(t_start));
 }
 
 HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double T_s, char message[])
@@ -167,24 +165,22 @@ HSEP_API hsep_status hsep_check_clock(hsep_clock *clock, double t_start, double 
 
 HSEP_API hsep_status hsep_check_step_size(double h, char message[])
 {
-    char number[HSEP_NUMBER_SIZE];
     if (h > 0.0 && h <= HSEP_CLOCK_STEP_MAX) {
         return HSEP_OK;
     }
     return hsep_message_add(
         message, "the communication step size must be > 0 and " HSEP_AT_MOST " %g s, got %s", HSEP_CLOCK_STEP_MAX,
-        hsep_number(number, h, HSEP_REAL));
+        HSEP_SHOWN(h));
 }
 
 HSEP_API hsep_status hsep_check_point(double end, double t, double tolerance, char message[])
 {
-    char expected[HSEP_NUMBER_SIZE], got[HSEP_NUMBER_SIZE];
     if (hsep_clock_follows(end, t, tolerance)) {
         return HSEP_OK;
     }
     return hsep_message_add(
-        message, "the communication point must be %s s, where the last step ended, got %s s",
-        hsep_number(expected, end, HSEP_REAL), hsep_number(got, t, HSEP_REAL));
+        message, "the communication point must be %s s, where the last step ended, got %s s", HSEP_SHOWN(end),
+        HSEP_SHOWN(t));
 }
 
 HSEP_API hsep_status hsep_check_step(const hsep_clock *clock, double t, double h, hsep_clock_step *step, char message[])

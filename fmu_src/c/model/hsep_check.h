@@ -22,6 +22,9 @@ HSEP_API hsep_status hsep_message_add(char message[], const char *format, ...);
 /* Write the shortest decimal number that reads back as value, whole ones of a real with ".0"; return text. */
 HSEP_API const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep_kind kind);
 
+/* The same for a real number, as text that lasts as long as the block that it stands in. */
+#define HSEP_SHOWN(value) hsep_number((char[HSEP_NUMBER_SIZE]){0}, value, HSEP_REAL)
+
 /* Check a parameter alone, by its place in the table; return whether it is in its range, else with a message. */
 HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, double value, char message[]);
 

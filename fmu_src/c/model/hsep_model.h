@@ -63,8 +63,8 @@ typedef struct {
     size_t n_last; /* single variables behind the modes */
     size_t window; /* samples in each window, 0 where they are left out */
     size_t n_variables;
-    const double
-        *starts; /* (n_scalars + HSEP_MODE_NUMBERS n_modes + n_last,), 0 for what is calculated; so are the windows */
+    /* (n_scalars + HSEP_MODE_NUMBERS n_modes + n_last,), 0 for what is calculated; so are the windows */
+    const double *starts;
     const char *guid;
     int angular;           /* whether it is a rotary axis */
     const char *resources; /* folder with a trailing slash, decoded; NULL if there is none */

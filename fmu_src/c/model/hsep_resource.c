@@ -1,8 +1,8 @@
 #include "hsep_resource.h"
 
-#ifndef HSEP_NO_FILES
-
 #include "hsep_text.h"
+
+#ifndef HSEP_NO_FILES
 
 #ifdef _WIN32
 #include <windows.h>
@@ -41,6 +41,4 @@ HSEP_API size_t hsep_resource_left(FILE *file)
     return end > here && fseek(file, here, SEEK_SET) == 0 ? (size_t)(end - here) : 0;
 }
 
-#else
-typedef int hsep_no_resource; /* a translation unit must not be empty */
 #endif

@@ -1,6 +1,5 @@
 #include "hsep_table.h"
 
-#include "hsep_layout.h"
 #include "hsep_text.h"
 
 #include <string.h>
@@ -35,13 +34,14 @@ HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, 
     if (place >= before) {
         const size_t sample = (place - before) % context->window + 1;
         hsep_text(text, HSEP_NAME_SIZE, "%.40s[%lu]", name, (unsigned long)sample);
-    } else if (place >= context->n_scalars && place < before - context->n_last) {
+        return text;
+    }
+    if (place >= context->n_scalars && place < before - context->n_last) {
         const size_t mode = (place - context->n_scalars) / HSEP_MODE_NUMBERS + 1;
         hsep_text(text, HSEP_NAME_SIZE, "mode[%lu].%.30s", (unsigned long)mode, name);
-    } else {
-        hsep_text(text, HSEP_NAME_SIZE, "%.60s", name);
+        return text;
     }
-    return text;
+    return name;
 }
 
 HSEP_API size_t hsep_table_place(const hsep_context *context, const char *name)

@@ -2,7 +2,6 @@
 #ifndef HSEP_TABLE_H
 #define HSEP_TABLE_H
 
-#include "hsep_api.h"
 #include "hsep_model.h"
 #include "hsep_physics.h"
 
@@ -14,7 +13,7 @@ HSEP_API size_t hsep_table_n_starts(const hsep_context *context);
 /* The row of a variable: the numbers of all modes share one each, as the samples of a window do. */
 HSEP_API const hsep_variable *hsep_table_row(const hsep_context *context, size_t place);
 
-/* The name of a variable, mode[1].f_n and x_h_window[1] too; return text. */
+/* The name of a variable: the row's, or in text, mode[1].f_n and x_h_window[1]. */
 HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, char text[HSEP_NAME_SIZE]);
 
 /* Place of the variable of a name; n_variables if there is none. */

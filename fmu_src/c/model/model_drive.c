@@ -13,7 +13,6 @@
 #include "hsep_table.h"
 
 #include <math.h>
-#include <string.h>
 
 #if defined(HSEP_MODEL_FEED_DRIVE)
 #define DRIVE(function) hsep_feed_drive_##function
@@ -34,7 +33,7 @@ typedef struct {
 /* The plant's own ---------------------------------------------------------------------------------------------------
  * drive_check: of its parameters together, after each alone; *bytes: of its block, counted in double. drive_begin: at
  * rest at the start value of x_d. drive_step: by h, s, with the command x_d, m, held; fails, with the state unchanged,
- * if the state overflows. drive_velocity: the true one, under the last step's command, m/s. */
+ * if the state overflows. */
 
 #if defined(HSEP_MODEL_FEED_DRIVE)
 
@@ -55,31 +54,25 @@ static hsep_status drive_check(const hsep_context *context, const double values[
 static void drive_begin(const hsep_context *context, hsep_feed_drive *self, const double values[])
 {
     (void)context;
-    self->m = values[HSEP_VR_m];
-    self->c = values[HSEP_VR_c];
-    self->k = values[HSEP_VR_k];
-    self->c_nl = values[HSEP_VR_c_nl];
-    self->k_nl = values[HSEP_VR_k_nl];
-    hsep_feed_drive_reset(self, values[HSEP_VR_x_d]);
+    *self = (hsep_feed_drive){
+        .m = values[HSEP_VR_m],
+        .c = values[HSEP_VR_c],
+        .k = values[HSEP_VR_k],
+        .c_nl = values[HSEP_VR_c_nl],
+        .k_nl = values[HSEP_VR_k_nl],
+        .start = values[HSEP_VR_x_d]};
 }
 
 static hsep_status drive_step(hsep_feed_drive *self, double x_d, double h, char message[])
 {
-    char number[HSEP_NUMBER_SIZE];
     double x = 0.0;
     if (!hsep_feed_drive_step(self, x_d, h, &x)) {
-        return hsep_message_add(
-            message, "the drive's state overflowed (x = %s, command %g m)", hsep_number(number, x, HSEP_REAL), x_d);
+        return hsep_message_add(message, "the drive's state overflowed (x = %s, command %g m)", HSEP_SHOWN(x), x_d);
     }
     return HSEP_OK;
 }
 
-static double drive_velocity(const hsep_feed_drive *self) { return hsep_feed_drive_v(self); }
-
 #else
-
-/* Work space for a step follows the stage: zeros between steps. */
-static size_t stage_work_size(uint64_t n_modes) { return (size_t)(HSEP_STAGE_WORK * n_modes) * sizeof(double); }
 
 static hsep_stage_settings stage_settings(const double values[])
 {
@@ -97,7 +90,7 @@ static hsep_status drive_check(const hsep_context *context, const double values[
 {
     const hsep_mode *modes = hsep_table_modes(context, values);
     const hsep_stage_settings settings = stage_settings(values);
-    *bytes = hsep_stage_size(context->n_modes, &settings) + (double)stage_work_size(context->n_modes);
+    *bytes = hsep_stage_lay_out(&(hsep_stage){0}, context->n_modes, &settings);
     for (size_t i = 0; i < context->n_modes; i++) {
         const double rate = hsep_plant_mode_rate(&modes[i]);
         if (rate > HSEP_PLANT_RATE_MAX) {
@@ -119,16 +112,11 @@ static void drive_begin(const hsep_context *context, hsep_stage *self, const dou
 
 static hsep_status drive_step(hsep_stage *self, double x_d, double h, char message[])
 {
-    double *work = hsep_at(self, (uint64_t)hsep_stage_size(self->n_modes, &self->settings) / sizeof(double));
-    const int done = hsep_stage_step(self, x_d, h, work);
-    memset(work, 0, stage_work_size(self->n_modes));
-    if (!done) {
+    if (!hsep_stage_step(self, x_d, h)) {
         return hsep_message_add(message, "the stage's state overflowed (command %g m)", x_d);
     }
     return HSEP_OK;
 }
-
-static double drive_velocity(const hsep_stage *self) { return self->v; }
 
 #endif
 
@@ -149,7 +137,7 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
 static void drive_write_outputs(drive_state *self, double values[])
 {
     values[HSEP_VR_x] = DRIVE(x)(&self->plant);
-    values[HSEP_VR_v] = drive_velocity(&self->plant);
+    values[HSEP_VR_v] = DRIVE(v)(&self->plant);
     values[HSEP_VR_x_meas] = hsep_encoder_measure(&self->encoder, values[HSEP_VR_x]);
 }
 
@@ -164,7 +152,7 @@ HSEP_API hsep_status hsep_model_initialise(
         return HSEP_REFUSED;
     }
     self->end = t_start;
-    hsep_encoder_init(&self->encoder, values[HSEP_VR_noise_std], (uint64_t)values[HSEP_VR_seed]);
+    self->encoder = (hsep_encoder){.noise_std = values[HSEP_VR_noise_std], .seed = (uint64_t)values[HSEP_VR_seed]};
     drive_begin(context, &self->plant, values);
     drive_write_outputs(self, values);
     return HSEP_OK;
@@ -174,7 +162,6 @@ HSEP_API hsep_status hsep_model_initialise(
 HSEP_API hsep_status
 hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
-    char number[HSEP_NUMBER_SIZE];
     drive_state *self = state;
     const double x_d = values[HSEP_VR_x_d], rate = DRIVE(rate)(&self->plant);
     message[0] = '\0';
@@ -186,7 +173,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     if (h > hsep_plant_step_max(rate)) {
         return hsep_message_add(
             message, "the step size must be at most %g s for a drive as fast as %g 1/s, got %s; make several steps",
-            hsep_plant_step_max(rate), rate, hsep_number(number, h, HSEP_REAL));
+            hsep_plant_step_max(rate), rate, HSEP_SHOWN(h));
     }
     if (drive_step(&self->plant, x_d, h, message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -211,12 +198,9 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     values[HSEP_VR_v] = 0.0;
     if (hsep_check_parameter(context, HSEP_VR_noise_std, noise_std, message) &&
         hsep_check_parameter(context, HSEP_VR_seed, seed, message)) {
-        hsep_encoder encoder;
-        hsep_encoder_init(&encoder, noise_std, (uint64_t)seed);
+        hsep_encoder encoder = {.noise_std = noise_std, .seed = (uint64_t)seed};
         values[HSEP_VR_x_meas] = hsep_encoder_measure(&encoder, x);
     }
 }
 
-#else
-typedef int hsep_no_drive; /* a translation unit must not be empty */
 #endif

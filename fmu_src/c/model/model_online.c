@@ -10,7 +10,6 @@
 
 #include "hsep_check.h"
 #include "hsep_compensator.h"
-#include "hsep_inputs.h"
 #include "hsep_learned.h"
 #include "hsep_parameters.h"
 #include "hsep_math.h"
@@ -30,8 +29,17 @@ typedef hsep_compensator online_block;
 typedef hsep_compensator_parameters online_parameters;
 #endif
 
+/* The clock, and the inputs of the sample in progress. */
 typedef struct {
-    hsep_inputs inputs;
+    hsep_clock clock;
+    double x_d_ahead, x_meas, x_load; /* m */
+    double nothing;                   /* what follows the struct begins at a multiple of 16 bytes */
+} online_inputs;
+
+HSEP_ASSERT_WORDS(online_inputs, 9);
+
+typedef struct {
+    online_inputs inputs;
     online_block online; /* its arrays follow */
 } online_state;
 
@@ -45,8 +53,8 @@ static void online_write_predicted(const hsep_predictor_outputs *outputs, double
     values[HSEP_VR_x_pb] = outputs->x_pb;
     values[HSEP_VR_x_h] = outputs->x_h;
     values[HSEP_VR_x_h_std] = outputs->x_h_std;
-    values[HSEP_VR_e_servo] =
-        outputs->x_d - outputs->x_h; /* the predicted servo error, of a compensator what is left */
+    /* The predicted servo error, of a compensator what is left */
+    values[HSEP_VR_e_servo] = outputs->x_d - outputs->x_h;
     values[HSEP_VR_rms_pb] = outputs->rms_pb;
     values[HSEP_VR_rms_h] = outputs->rms_h;
     values[HSEP_VR_rms_hold] = outputs->rms_hold;
@@ -57,8 +65,7 @@ static void online_write_predicted(const hsep_predictor_outputs *outputs, double
 /* The model's own ---------------------------------------------------------------------------------------------------
  * online_check: of its settings together, each problem added to message. online_derive: its parameters, after all were
  * checked and the common ones read. online_tune: the tunable parameters, from the next window on. online_begin: after
- * learned weights were loaded. online_x_load: the drive's load. online_sample: process a
- * sample. */
+ * learned weights were loaded. online_x_load: the drive's load. online_sample: process a sample. */
 
 #if defined(HSEP_MODEL_HYBRID_PREDICTOR)
 
@@ -70,7 +77,7 @@ static double online_x_load(const hsep_context *context, const double values[])
     (void)context, (void)values;
     return 0.0;
 }
-static void online_sample(hsep_predictor *self, const hsep_inputs *inputs)
+static void online_sample(hsep_predictor *self, const online_inputs *inputs)
 {
     (void)hsep_predictor_sample(self, inputs->x_d_ahead, inputs->x_meas);
 }
@@ -154,7 +161,7 @@ static double online_x_load(const hsep_context *context, const double values[])
 {
     return values[HSEP_VR_x_load(context)];
 }
-static void online_sample(hsep_compensator *self, const hsep_inputs *inputs)
+static void online_sample(hsep_compensator *self, const online_inputs *inputs)
 {
     hsep_compensator_load(self, inputs->x_load);
     (void)hsep_compensator_sample(self, inputs->x_d_ahead, inputs->x_meas);
@@ -198,12 +205,95 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
 
 #endif
 
+/* Inputs, which are latched at the instants within a communication step, and executed in the step that reaches the next
+ * instant --------------------------------------------------------------------------------------------------------- */
+
+/* A step in progress. */
+typedef struct {
+    hsep_clock_step counted;
+    int64_t n_latched, n_executed; /* of the instants that the step has */
+    int pending;                   /* whether the inputs of the next sample are latched */
+} online_step;
+
+/* An input, by its place, at an instant, s after the step's start; the importer may have set its time derivative. */
+static double online_at(const hsep_context *context, const double values[], size_t place, double after)
+{
+    const double slope = values[context->n_variables + place];
+    return slope == 0.0 ? values[place] : values[place] + slope * after;
+}
+
+/* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. may_miss: whether x_meas may be
+ * NaN, which is missing. Fails if one of them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant
+ * is no communication point; HSEP_WARNED_MOVED: one was taken at a point beside it; or both. */
+static hsep_status online_count(
+    const hsep_context *context, const online_inputs *self, const double values[], int may_miss, double t, double h,
+    online_step *step, char message[])
+{
+    *step = (online_step){.pending = hsep_clock_latched(&self->clock)};
+    if (hsep_check_step(&self->clock, t, h, &step->counted, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    const hsep_clock_step *counted = &step->counted;
+    if (counted->n_latched == 0) {
+        return hsep_check_moved(counted, message);
+    }
+    /* Inputs are linear in time, so the first and the last one, s after the step's start, bound them all. */
+    const double last = counted->first + (double)(counted->n_latched - 1) * self->clock.T_s;
+    const double after[2] = {counted->first, last}, sample = (double)(self->clock.k + step->pending);
+    const double x_load = online_x_load(context, values); /* constant over the step */
+    if (hsep_check_position(context, "x_load", x_load, " at sample %.0f", sample, message) != HSEP_OK) {
+        return HSEP_REFUSED;
+    }
+    for (int i = 0; i < 2; i++) {
+        const double ahead = online_at(context, values, HSEP_VR_x_d_ahead, after[i]);
+        const double measured = online_at(context, values, HSEP_VR_x_meas, after[i]);
+        const int missing = may_miss && isnan(measured);
+        if (hsep_check_position(context, "x_d_ahead", ahead, " at sample %.0f", sample, message) != HSEP_OK ||
+            (!missing &&
+             hsep_check_position(context, "x_meas", measured, " at sample %.0f", sample, message) != HSEP_OK)) {
+            return HSEP_REFUSED;
+        }
+    }
+    const hsep_status status = hsep_check_moved(counted, message);
+    if (counted->inside) {
+        hsep_message_add(
+            message,
+            "the step from %.9g s by %.9g s contains sampling instants of T_s = %g s between its ends: x_meas is read "
+            "up to %g s late, so a closed loop needs steps of T_s",
+            t, h, self->clock.T_s, fmin(last, h));
+        return status == HSEP_OK ? HSEP_WARNED_LATE : HSEP_WARNED_BOTH;
+    }
+    return status;
+}
+
+/* Go on in a counted step: return 1 with the next sample to execute in self, 0 when the step is done. */
+static int online_next(const hsep_context *context, online_inputs *self, const double values[], online_step *step)
+{
+    if (!step->pending && step->n_latched < step->counted.n_latched) {
+        const double after = step->counted.first + (double)step->n_latched * self->clock.T_s;
+        self->x_d_ahead = online_at(context, values, HSEP_VR_x_d_ahead, after);
+        self->x_meas = online_at(context, values, HSEP_VR_x_meas, after);
+        self->x_load = online_x_load(context, values);
+        step->pending = 1;
+        step->n_latched++;
+    }
+    if (step->n_executed < step->counted.n_samples) {
+        step->pending = 0;
+        self->clock.k++;
+        step->n_executed++;
+        return 1;
+    }
+    self->clock = step->counted.after;
+    return 0;
+}
+
 /* Both models' ---------------------------------------------------------------------------------------------------- */
 
-/* Check all parameters, and read them: those of the library, whose modes stay in values, and the model's. */
+/* Check all parameters, and read them: those of the library, whose modes stay in values, and the model's; size: of the
+ * state, bytes. */
 static hsep_status online_checked(
     const hsep_context *context, const double values[], hsep_parameters *parameters, online_parameters *derived,
-    char message[])
+    size_t *size, char message[])
 {
     const double Np = values[HSEP_VR_Np], p = values[HSEP_VR_p], q = values[HSEP_VR_q];
     message[0] = '\0';
@@ -227,11 +317,6 @@ static hsep_status online_checked(
     HSEP_AVERAGING_SETTINGS(READ)
 #undef READ
     *derived = online_derive(values, parameters);
-    return HSEP_OK;
-}
-
-static hsep_status online_size(const online_parameters *derived, size_t *size, char message[])
-{
     const double before = (double)(sizeof(online_state) - sizeof(online_block));
     return hsep_check_bytes(before + ONLINE(lay_out)(&(online_block){0}, derived), size, message);
 }
@@ -240,9 +325,7 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
 {
     hsep_parameters parameters;
     online_parameters derived;
-    return online_checked(context, values, &parameters, &derived, message) == HSEP_OK
-               ? online_size(&derived, size, message)
-               : HSEP_REFUSED;
+    return online_checked(context, values, &parameters, &derived, size, message);
 }
 
 /* Add to message what differs from what the weights were learned with. */
@@ -316,8 +399,8 @@ HSEP_API hsep_status hsep_model_initialise(
     hsep_parameters parameters;
     online_parameters derived;
     const double start = values[HSEP_VR_x_d_ahead];
-    if (online_checked(context, values, &parameters, &derived, message) != HSEP_OK ||
-        online_size(&derived, &needed, message) != HSEP_OK || hsep_check_memory(needed, size, message) != HSEP_OK ||
+    if (online_checked(context, values, &parameters, &derived, &needed, message) != HSEP_OK ||
+        hsep_check_memory(needed, size, message) != HSEP_OK ||
         hsep_model_check_start(context, values, message) != HSEP_OK ||
         hsep_check_clock(&self->inputs.clock, t_start, values[HSEP_VR_T_s], message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -354,23 +437,19 @@ HSEP_API hsep_status
 hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {
     online_state *self = state;
-    const double *slopes = values + context->n_variables;
     hsep_predictor *predictor = online_predictor(&self->online);
     const int may_miss = hsep_residual_averaged(hsep_predictor_model(predictor)) != NULL;
-    const hsep_input x_d_ahead = {values[HSEP_VR_x_d_ahead], slopes[HSEP_VR_x_d_ahead]};
-    const hsep_input x_meas = {values[HSEP_VR_x_meas], slopes[HSEP_VR_x_meas]};
-    hsep_inputs_step step;
+    online_step step;
     message[0] = '\0';
     if (online_converges(predictor, message) != HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;
     }
-    const hsep_status status = hsep_inputs_count(
-        context, &self->inputs, x_d_ahead, x_meas, online_x_load(context, values), may_miss, t, h, &step, message);
+    const hsep_status status = online_count(context, &self->inputs, values, may_miss, t, h, &step, message);
     if (status == HSEP_REFUSED) {
         return HSEP_REFUSED;
     }
     online_tune(&self->online, values);
-    while (hsep_inputs_next(&self->inputs, &step)) {
+    while (online_next(context, &self->inputs, values, &step)) {
         online_sample(&self->online, &self->inputs);
         if (online_converges(predictor, message) != HSEP_OK) {
             return HSEP_REFUSED;
@@ -380,6 +459,4 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     return status;
 }
 
-#else
-typedef int hsep_no_online; /* a translation unit must not be empty */
 #endif

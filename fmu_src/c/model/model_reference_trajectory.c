@@ -48,7 +48,7 @@ static double trajectory_position(const trajectory_state *self, int64_t k)
  * samples. The caller closes it; NULL with a message if something does not fit. */
 static FILE *trajectory_open(const hsep_context *context, const double values[], uint64_t *count, char message[])
 {
-    char name[TRAJECTORY_NAME_SIZE], expected[HSEP_NUMBER_SIZE], got[HSEP_NUMBER_SIZE];
+    char name[TRAJECTORY_NAME_SIZE];
     trajectory_head head;
     if (hsep_check_parameters(context, values, message) > 0) {
         return NULL;
@@ -66,8 +66,8 @@ static FILE *trajectory_open(const hsep_context *context, const double values[],
         hsep_message_add(message, "%s must be samples of a trajectory, at least one; it is damaged or truncated", name);
     } else if (!(fabs(head.T_s - values[HSEP_VR_T_s]) <= trajectory_tolerance * values[HSEP_VR_T_s])) {
         hsep_message_add(
-            message, "T_s must be %s s, the interval of %s, got %s", hsep_number(expected, head.T_s, HSEP_REAL), name,
-            hsep_number(got, values[HSEP_VR_T_s], HSEP_REAL));
+            message, "T_s must be %s s, the interval of %s, got %s", HSEP_SHOWN(head.T_s), name,
+            HSEP_SHOWN(values[HSEP_VR_T_s]));
     } else {
         *count = head.count;
         return file;
@@ -97,7 +97,6 @@ HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double v
 HSEP_API hsep_status hsep_model_initialise(
     const hsep_context *context, void *state, size_t size, double values[], double t_start, char message[])
 {
-    char number[HSEP_NUMBER_SIZE];
     trajectory_state *self = state;
     size_t needed = 0;
     uint64_t count = 0;
@@ -121,7 +120,7 @@ HSEP_API hsep_status hsep_model_initialise(
         if (k >= n_read || !isfinite(self->samples[k])) {
             return hsep_message_add(
                 message, "trajectory_%.0f.bin must be finite, got %s at sample %.0f", values[HSEP_VR_trajectory],
-                k < n_read ? hsep_number(number, self->samples[k], HSEP_REAL) : "nothing", (double)k);
+                k < n_read ? HSEP_SHOWN(self->samples[k]) : "nothing", (double)k);
         }
     }
     values[HSEP_VR_r] = trajectory_position(self, 0);
@@ -166,6 +165,4 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     fclose(file);
 }
 
-#else
-typedef int hsep_no_reference_trajectory; /* a translation unit must not be empty */
 #endif

@@ -35,12 +35,6 @@ HSEP_API double hsep_feed_drive_rate(const hsep_feed_drive *self)
     return fmax(sqrt(self->k / self->m), self->c / self->m);
 }
 
-HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start)
-{
-    self->start = start;
-    self->x = self->u = self->x_d = 0.0;
-}
-
 HSEP_API double hsep_feed_drive_x(const hsep_feed_drive *self) { return self->start + self->x; }
 
 HSEP_API double hsep_feed_drive_v(const hsep_feed_drive *self) { return self->u + self->c / self->m * self->x_d; }
@@ -78,8 +72,7 @@ HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, d
     return 1;
 }
 
-/* Set what follows from the number of modes and the settings; return the bytes of the block. */
-static double stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings)
+HSEP_API double hsep_stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings)
 {
     double end = HSEP_WORDS(hsep_stage);
     self->settings = *settings;
@@ -91,6 +84,7 @@ static double stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage
     self->modes = hsep_take(&end, (double)n_modes * HSEP_WORDS(hsep_stage_mode));
     self->z = hsep_take(&end, 2.0 * (double)n_modes);
     self->line = hsep_take(&end, (double)self->n_line);
+    (void)hsep_take(&end, 8.0 * (double)n_modes); /* work space */
     return end * sizeof(double);
 }
 
@@ -99,21 +93,14 @@ static const hsep_stage_mode *stage_modes(const hsep_stage *self)
     return (const hsep_stage_mode *)hsep_at_const(self, self->modes);
 }
 
-HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings)
-{
-    return stage_lay_out(&(hsep_stage){0}, n_modes, settings);
-}
-
 HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,
     double start)
 {
-    self->friction_gain = 0.0;
-    self->start = start;
-    self->acting = self->last_x_d = self->v_d = self->v = 0.0;
-    self->oldest = 0;
+    memset(self, 0, (size_t)hsep_stage_lay_out(self, n_modes, settings));
+    (void)hsep_stage_lay_out(self, n_modes, settings);
     (void)hsep_clock_init(&self->clock, 0.0, T_s);
-    (void)stage_lay_out(self, n_modes, settings);
+    self->start = start;
     hsep_stage_mode *stage = (hsep_stage_mode *)hsep_at(self, self->modes);
     for (uint64_t i = 0; i < n_modes; i++) {
         const double omega = HSEP_TWO_PI * modes[i].f_n;
@@ -124,8 +111,6 @@ HSEP_API void hsep_stage_init(
         self->friction_gain += modes[i].beta;
     }
     self->friction_gain *= settings->f;
-    memset(hsep_at(self, self->z), 0, (size_t)(2 * n_modes) * sizeof(double));
-    memset(hsep_at(self, self->line), 0, (size_t)self->n_line * sizeof(double));
 }
 
 /* sum alpha z + beta z' over the modes, z: (2 n_modes,). */
@@ -239,14 +224,14 @@ HSEP_API double hsep_stage_rate(const hsep_stage *self)
     return rate;
 }
 
-HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[])
+HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h)
 {
     const double r = x_d - self->start;
     const int foh = self->settings.input_hold == HSEP_FIRST_ORDER_HOLD, late = self->settings.dead_time > 0;
     double acting = foh || late ? self->acting : r;
     double last_x_d = self->last_x_d, v_d = self->v_d, v = self->v, done = 0.0;
     const size_t z_size = (size_t)(2 * self->n_modes) * sizeof(double);
-    double *z = work, *slope = work + 2 * self->n_modes, *line = hsep_at(self, self->line);
+    double *line = hsep_at(self, self->line), *z = line + self->n_line, *slope = z + 2 * self->n_modes;
     hsep_clock_step step;
     (void)hsep_clock_count(&self->clock, self->clock.end, h, &step);
     memcpy(z, hsep_at(self, self->z), z_size);
@@ -271,24 +256,25 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work
             last_x_d = left;
         }
     }
-    for (uint64_t i = 0; i < 2 * self->n_modes; i++) {
-        if (!(fabs(z[i]) < plant_state_max)) { /* NaN too */
-            return 0;
+    const int finite = hsep_within(z, 2 * self->n_modes, plant_state_max);
+    if (finite) {
+        plant_stage_slope(self, z, plant_disturbed(self, acting, v_d), v, slope);
+        self->v = plant_position(self, slope);
+        memcpy(hsep_at(self, self->z), z, z_size);
+        for (uint64_t i = 0; i < (uint64_t)step.n_latched && i < self->n_line; i++) {
+            line[self->oldest] = r;
+            self->oldest = (self->oldest + 1) % self->n_line;
         }
+        self->acting = acting;
+        self->last_x_d = last_x_d;
+        self->v_d = v_d;
+        self->clock = step.after;
     }
-    plant_stage_slope(self, z, plant_disturbed(self, acting, v_d), v, slope);
-    self->v = plant_position(self, slope);
-    memcpy(hsep_at(self, self->z), z, z_size);
-    for (uint64_t i = 0; i < (uint64_t)step.n_latched && i < self->n_line; i++) {
-        line[self->oldest] = r;
-        self->oldest = (self->oldest + 1) % self->n_line;
-    }
-    self->acting = acting;
-    self->last_x_d = last_x_d;
-    self->v_d = v_d;
-    self->clock = step.after;
-    return 1;
+    memset(z, 0, 4 * z_size);
+    return finite;
 }
+
+HSEP_API double hsep_stage_v(const hsep_stage *self) { return self->v; }
 
 HSEP_API double hsep_stage_x(const hsep_stage *self)
 {
@@ -302,13 +288,6 @@ static uint64_t encoder_split_mix_64(uint64_t seed, uint64_t index)
     z = (z ^ (z >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
     z = (z ^ (z >> 27)) * UINT64_C(0x94D049BB133111EB);
     return z ^ (z >> 31);
-}
-
-HSEP_API void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed)
-{
-    self->noise_std = noise_std;
-    self->seed = seed;
-    self->n_draws = 0;
 }
 
 HSEP_API double hsep_encoder_measure(hsep_encoder *self, double x)

@@ -8,9 +8,7 @@
 #ifndef HSEP_PLANT_H
 #define HSEP_PLANT_H
 
-#include "hsep_api.h"
 #include "hsep_clock.h"
-#include "hsep_layout.h"
 #include "hsep_physics.h"
 
 #include <stdint.h>
@@ -24,16 +22,13 @@ HSEP_API double hsep_plant_step_max(double rate);
 HSEP_API double hsep_plant_mode_rate(const hsep_mode *mode);
 
 /* m x'' + c x' + k x + H_NL = c x_d' + k x_d with H_NL = c_nl x'|x'| + k_nl x|x|, eq. (13), in the states x and
- * u = x' - (c/m) x_d. */
+ * u = x' - (c/m) x_d. The caller sets parameters and start; the drive rests where the others are 0. */
 typedef struct {
     double m, c, k;    /* kg, N.s/m, N/m, > 0 */
     double c_nl, k_nl; /* N.s2/m2, N/m2, >= 0 */
     double start;      /* position of rest, m */
     double x, u, x_d;  /* m, m/s, and the last command, m, from there */
 } hsep_feed_drive;
-
-/* Reset the drive to rest at start, m; its parameters are set by the caller. */
-HSEP_API void hsep_feed_drive_reset(hsep_feed_drive *self, double start);
 
 /* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. Fails, and returns 0 with the state
  * unchanged, if the state overflows; *x then tells the position reached, m. */
@@ -64,7 +59,7 @@ typedef struct {
 /* x = G_pb (x_d - d) with d = f tanh(v_f / v_friction) + kappa x|x|; v_f is the velocity of the friction. Without a
  * dead time and held, a command acts at once; else it is sampled at the instants. A first-order hold with a dead time
  * goes from the last command to this one, which takes one sample of the dead time; without a dead time it goes on with
- * the last slope. */
+ * the last slope. A block as hsep_layout.h has them. */
 typedef struct {
     hsep_stage_settings settings;
     double friction_gain; /* m/s, velocity that the whole friction takes away at once, f sum beta */
@@ -78,7 +73,7 @@ typedef struct {
     /* Offsets in doubles from the beginning of the struct */
     uint64_t modes; /* hsep_stage_mode[n_modes] */
     uint64_t z;     /* (2 n_modes,) z and z' of each, m s^2 and m s */
-    uint64_t line;  /* (n_line,) m from start */
+    uint64_t line;  /* (n_line,) m from start; then work space of a step, (8 n_modes,), zeros between steps */
 } hsep_stage;
 
 HSEP_ASSERT_WORDS(hsep_feed_drive, 9);
@@ -86,34 +81,30 @@ HSEP_ASSERT_WORDS(hsep_stage_mode, 4);
 HSEP_ASSERT_WORDS(hsep_stage_settings, 6);
 HSEP_ASSERT_WORDS(hsep_stage, 23);
 
-#define HSEP_STAGE_WORK 8 /* doubles of work space for each mode */
-
-/* Bytes of the block, counted in double. */
-HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings);
+HSEP_API double hsep_stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings);
 
 /* Reset the stage to rest at start, m. modes: (n_modes,). */
 HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,
     double start);
 
-/* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. work: (HSEP_STAGE_WORK n_modes,).
- * Fails, and returns 0 with the state unchanged, if the state overflows. */
-HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h, double work[]);
+/* Advance by h, s, at most hsep_plant_step_max, with the command x_d, m, held. Fails, and returns 0 with
+ * the state unchanged, if the state overflows. */
+HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h);
 
 HSEP_API double hsep_stage_rate(const hsep_stage *self); /* of the fastest mode, 1/s */
 HSEP_API double hsep_stage_x(const hsep_stage *self);    /* true position, m */
+HSEP_API double hsep_stage_v(const hsep_stage *self);    /* true velocity under the last step's command, m/s */
 
 /* Position sensor with Gaussian noise from a portable generator: SplitMix64 (Steele, Lea and Flood 2014) gives two
  * uniform numbers per sample, the Box-Muller transform (1958) one normal number. */
 typedef struct {
     double noise_std; /* m, >= 0 */
     uint64_t seed;
-    uint64_t n_draws; /* so far */
+    uint64_t n_draws; /* so far, 0 in the beginning */
 } hsep_encoder;
 
 HSEP_ASSERT_WORDS(hsep_encoder, 3);
-
-HSEP_API void hsep_encoder_init(hsep_encoder *self, double noise_std, uint64_t seed);
 
 /* Return one measurement of the position x, m. Constant cost; cannot fail. */
 HSEP_API double hsep_encoder_measure(hsep_encoder *self, double x);

@@ -4,6 +4,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 /* The checksum of size bytes, 4 bits at a time. */
 static inline uint32_t hsep_crc(const void *bytes, size_t size)
@@ -19,6 +20,17 @@ static inline uint32_t hsep_crc(const void *bytes, size_t size)
         crc = (crc >> 4) ^ table[crc & 15U];
     }
     return ~crc;
+}
+
+/* Whether the last 8 bytes are the checksum of the others. */
+static inline int hsep_is_sealed(const void *bytes, size_t size)
+{
+    uint64_t sum = 0;
+    if (size < sizeof sum) {
+        return 0;
+    }
+    memcpy(&sum, (const char *)bytes + size - sizeof sum, sizeof sum);
+    return sum == hsep_crc(bytes, size - sizeof sum);
 }
 
 #endif

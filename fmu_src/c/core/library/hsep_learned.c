@@ -116,17 +116,6 @@ static uint64_t learned_n_settings(const hsep_parameters *parameters)
     return n + n_mode * parameters->n_modes;
 }
 
-/* Whether the last 8 bytes are the checksum of the others. */
-static int learned_is_whole(const unsigned char *bytes, size_t size)
-{
-    uint64_t sum = 0;
-    if (size < sizeof sum) {
-        return 0;
-    }
-    memcpy(&sum, bytes + size - sizeof sum, sizeof sum);
-    return sum == hsep_crc(bytes, size - sizeof sum);
-}
-
 HSEP_API hsep_began
 hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, const void *bytes, size_t size)
 {
@@ -135,7 +124,7 @@ hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, 
     if (bytes == NULL) {
         return HSEP_BEGAN;
     }
-    if (!learned_is_whole(bytes, size) || !hsep_learned_read(&from, &head, sizeof head) ||
+    if (!hsep_is_sealed(bytes, size) || !hsep_learned_read(&from, &head, sizeof head) ||
         memcmp(head.magic, HSEP_LEARNED_MAGIC, sizeof head.magic) != 0) {
         return HSEP_WEIGHTS_DAMAGED;
     }

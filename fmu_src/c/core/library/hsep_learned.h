@@ -7,8 +7,6 @@
 #ifndef HSEP_LEARNED_H
 #define HSEP_LEARNED_H
 
-#include "hsep_api.h"
-#include "hsep_layout.h"
 #include "hsep_parameters.h"
 #include "hsep_predictor.h"
 

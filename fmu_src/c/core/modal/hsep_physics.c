@@ -112,12 +112,11 @@ HSEP_API hsep_real hsep_physics_size(hsep_int n_modes, hsep_int dead_time)
 HSEP_API void hsep_physics_init(
     hsep_physics *self, const hsep_mode modes[], hsep_int n_modes, hsep_int dead_time, hsep_real T_s, hsep_hold hold)
 {
+    memset(self, 0, (size_t)hsep_physics_size(n_modes, dead_time));
     (void)physics_lay_out(self, n_modes, dead_time);
-    self->oldest = 0;
     for (hsep_int i = 0; i < n_modes; i++) {
         hsep_discretise(&physics_modes(self)[i], &modes[i], T_s, hold);
     }
-    memset(hsep_at(self, self->ring), 0, (size_t)dead_time * sizeof(hsep_real));
 }
 
 HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[])

@@ -7,7 +7,6 @@
 
 #include "hsep.h"
 #include "hsep_layout.h"
-#include "hsep_real.h"
 
 #include <stddef.h>
 

@@ -3,7 +3,6 @@
 #include "hsep_cholesky.h"
 #include "hsep_vector.h"
 
-#include <stddef.h>
 #include <string.h>
 
 /* Set what follows from the number of features; return the bytes of the block. */
@@ -62,8 +61,8 @@ HSEP_API void hsep_gram_settle(hsep_gram *self)
 
 HSEP_API hsep_real *hsep_gram_row(hsep_gram *self)
 {
-    if (self->waiting ==
-        HSEP_GRAM_TOGETHER) { /* only now: a window's last sample, the fourth mostly, has enough to do */
+    /* Only now: a window's last sample, the fourth mostly, has enough to do. */
+    if (self->waiting == HSEP_GRAM_TOGETHER) {
         hsep_gram_settle(self);
     }
     return hsep_at(self, self->rows) + (self->n + 1) * self->waiting;

@@ -10,7 +10,6 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-#include "hsep_real.h"
 
 #define HSEP_GRAM_TOGETHER 4 /* rows that are added in one go */
 

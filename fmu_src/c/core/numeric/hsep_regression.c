@@ -3,7 +3,6 @@
 #include "hsep_cholesky.h"
 #include "hsep_math.h"
 
-#include <stddef.h>
 #include <string.h>
 
 static const hsep_real regression_lambda_min = HSEP_TINY(1e-290);

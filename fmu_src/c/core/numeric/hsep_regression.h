@@ -15,7 +15,6 @@
 
 #include "hsep_api.h"
 #include "hsep_layout.h"
-#include "hsep_real.h"
 
 typedef struct {
     hsep_int n;       /* features */

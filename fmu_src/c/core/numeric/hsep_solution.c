@@ -4,7 +4,6 @@
 #include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include <stddef.h>
 #include <string.h>
 
 /* Set what follows from the parameters; return the bytes of the block. */
@@ -66,11 +65,7 @@ static void solution_add(hsep_solution *self, const hsep_gram *gram, hsep_real w
             *to += weight * row[n_head - i - 1 - j];
             to += n_head + n_tail - j;
         }
-        to = factor + n_head + n_tail;
-        for (hsep_int j = 0; j < n_head - 1 - i; j++) {
-            to += n_head + n_tail - j;
-        }
-        *to += weight * row[n - n_tail - i];
+        *to += weight * row[n - n_tail - i]; /* a step from the diagonal: the row's target */
         row += n - n_tail + 1 - i;
     }
     const hsep_real square = hsep_at_const(gram, gram->sums)[(hsep_int)hsep_triangle(n + 1) - 1];

@@ -2,7 +2,6 @@
 
 #include "hsep_math.h"
 
-#include <stddef.h>
 #include <string.h>
 
 HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters)

@@ -28,7 +28,6 @@
 
 #include "hsep.h"
 #include "hsep_physics.h"
-#include "hsep_real.h"
 #include "hsep_residual_model.h"
 #include "hsep_settings.h"
 #include "hsep_start.h"
