@@ -222,7 +222,9 @@ class SepCompensator:
         more = np.arange(1, self.horizon - self.preview + 1)
         path = np.concatenate((command, command[-1] + (command[-1] - command[-2]) * more))
         loads = np.concatenate((loads, np.full(len(more), loads[-1])))
-        preview = Preview(path, loads, self._x_d_before[-3:], self._delta_before, self._previous_plan)
+        preview = Preview(
+            path, loads, self._x_d_before[-3:], self._delta_before, self._previous_plan, self._state_before
+        )
         fades = self.monitor.is_tripped or self.monitor.is_lost
         compensate = SepState.OFF if fades else self.compensate
         chosen = self._planning.choose(predictor, preview, compensate)

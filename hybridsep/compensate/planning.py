@@ -1,8 +1,9 @@
 """Planning: how the plan of a window is chosen and published, with the paper's model and with the averaged one.
 
 With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. The averaged one, as
-soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan, which fades
-to no change. Where its own plan runs away, it plans none for a time. A motion faster than all of its run is compensated
+soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan. Where its
+own plan runs away, it plans none for a time, and one that ends compensation is judged in place of the remainder; that
+is followed, too, where compensation is switched off, or has tripped. A motion faster than all of its run is compensated
 with at most half of the largest change.
 """
 
@@ -49,6 +50,7 @@ class Preview:
     x_d_before: Array
     delta_before: Array
     previous_plan: Array  # (3 + n_free,), m: coefficients of the remainder of the last plan, the decided ones first
+    state_before: SepState  # model of the last plan
 
 
 class ChosenPlan(NamedTuple):
@@ -218,6 +220,9 @@ this share of ``change_max`` only. ``change_max`` is to be twice the largest err
 error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
 may change it by all of ``change_max`` where weights of earlier runs judge it."""
 
+_ENDS = 5.0
+"""Periods in a plan of the change whose jerk weighs as much as the change itself in a plan that ends compensation."""
+
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
 model."""
@@ -255,7 +260,8 @@ class AveragedPlanning(Planning):
         model = self._model(predictor, path, preview)
         previous_plan, scales = preview.previous_plan, model.scales
         if most is SepState.OFF:
-            return ChosenPlan(SepState.OFF, previous_plan, scales)
+            ended = previous_plan if preview.state_before is SepState.OFF else self.ending(preview)
+            return ChosenPlan(SepState.OFF, ended, scales)
         g, free = predictor.physics_operator(self.horizon)
         change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
         of_physics_change = 1.0 if model.is_trained else change
@@ -270,7 +276,9 @@ class AveragedPlanning(Planning):
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
             planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
-            last, of_physics, is_away = planner.previous(previous_plan), planner.point(physics), False
+            ends = bool(self.paused) and most is SepState.HYBRID
+            last = planner.point(self.ending(preview)) if ends else planner.previous(previous_plan)
+            of_physics, is_away = planner.point(physics), False
             if follows:
                 bounds = self.limits(preview, may_turn=True, change=change)
                 hybrid = planner.plan(last, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
@@ -281,8 +289,21 @@ class AveragedPlanning(Planning):
                     if not is_away:
                         return ChosenPlan(SepState.HYBRID, hybrid.coefficients, scales)
             if is_better(last.cost, of_physics.cost):
-                return ChosenPlan(SepState.OFF, previous_plan, scales, is_away)
+                return ChosenPlan(SepState.OFF, last.coefficients, scales, is_away)
         return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)
+
+    def ending(self, preview: Preview) -> Array:
+        """Return the coefficients, ``(3 + n_free,)``, m, of a plan that ends compensation, smoothly and soon.
+
+        It has the least change of the command that its jerk and the drive's limits allow; where there is none, the
+        remainder of the last plan goes on.
+        """
+        decided, last = np.split(preview.previous_plan, [N_DECIDED])
+        at_once, nothing = np.eye(1, self.horizon)[0], np.zeros(self.horizon)
+        jerk_weight = (2.0 * math.sin(math.pi * _ENDS / self.horizon)) ** -6.0
+        cost = self.basis.cost(at_once, nothing, nothing, decided, preview.delta_before, jerk_weight)
+        found = solve(cost, self.limits(preview), last, self.n_pinned, always=True, tolerance=TOLERANCE)
+        return preview.previous_plan if found is None else np.concatenate((decided, found.x))
 
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
         """Return the model's position wherever it may plan.

@@ -365,9 +365,12 @@ static hsep_real averaged_planner_left(
         left += (hsep_real)(window - first + behind) * work->sample +
                 (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
     }
+    const hsep_real programme = 15.0 * work->number + 4.0 * work->pairs + work->factor + work->solve;
     if (self->place == 0 && self->planned) {
-        left += 15.0 * work->number + 4.0 * work->pairs + work->factor + work->solve +
-                (hsep_real)averaged_planner_physics_steps(self) * parts;
+        left += programme + (hsep_real)averaged_planner_physics_steps(self) * parts;
+    }
+    if (self->place == 0 && self->ends) {
+        left += programme + 2.0 * work->predict + (hsep_real)averaged_planner_tolerance.steps * parts;
     }
     if (self->place == 0 && self->follows) {
         hsep_real newton = work->linearise + averaged_planner_of_products(self, task, pinned, n) + work->factor +
@@ -439,8 +442,34 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         self->judges = self->judges && self->planned;
         self->follows = self->follows && self->planned;
 
-        /* Newton steps from the remainder of the last plan, as long as they lower the cost */
+        /* In place of the remainder of the last plan one that ends compensation, where it is off or pauses */
         self->cost_of_rest = self->cost;
+        if (self->ends) {
+            averaged_planner_copy(self, c, rest);
+            AVERAGED_PLANNER_YIELD(20, 15.0 * work.number + 4.0 * work.pairs);
+            hsep_planner_end(planner, task->x_d);
+            AVERAGED_PLANNER_YIELD(21, work.factor);
+            if (hsep_planner_factor(planner, 1)) {
+                AVERAGED_PLANNER_YIELD(22, work.solve);
+                (void)averaged_planner_solve(self, task, averaged_planner_tolerance.steps);
+                while (self->solving) {
+                    AVERAGED_PLANNER_YIELD(23, work.step);
+                    self->solving = !hsep_planner_advance(planner);
+                }
+            }
+            averaged_planner_copy(self, rest, c);
+        }
+        if (self->ends && self->judges) {
+            AVERAGED_PLANNER_YIELD(24, work.predict);
+            averaged_planner_begin_to_predict(self, task, rest);
+            while (self->samples < all) {
+                AVERAGED_PLANNER_YIELD(25, 0.5 * work.predict);
+                averaged_planner_predict_half(self, task, rest);
+            }
+            self->cost_of_rest = averaged_planner_cost(self, task, rest);
+        }
+
+        /* Newton steps from the remainder of the last plan, as long as they lower the cost */
         if (self->follows) {
             averaged_planner_copy(self, hsep_at(self, self->best), rest);
             hsep_planner_follow_friction(planner);
@@ -551,9 +580,11 @@ HSEP_API void hsep_averaged_planner_begin(
     hsep_averaged_forecast(
         task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
         hsep_at(self, self->e_h), self->samples);
+    const int was_planned = self->planned > 0;
     self->planned = best > 0;
     self->judges = self->planned && warm && task->model->predicted[HSEP_STATIC];
     self->follows = self->judges && best > 1 && self->paused == 0;
+    self->ends = best > 0 ? self->judges && best > 1 && self->paused > 0 : was_planned;
     self->paused -= self->paused > 0;
     averaged_planner_go_on(self, task);
 }

@@ -34,6 +34,7 @@ typedef struct {
     hsep_int place;         /* yield behind which the plan goes on; 0: at its beginning */
     hsep_int judges;        /* whether the averaged model judges plans, */
     hsep_int follows;       /* and whether it may plan */
+    hsep_int ends;          /* whether a plan that ends compensation stands for the remainder of the last one */
     hsep_int n_steps;       /* Newton steps of a plan at most, */
     hsep_int steps;         /* those done, */
     hsep_int gains;         /* whether the last one lowered the cost, */
@@ -67,7 +68,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 38);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 39);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {

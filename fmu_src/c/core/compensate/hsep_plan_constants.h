@@ -40,6 +40,7 @@
 #define HSEP_PLANNING_RETRY 0.5
 #define HSEP_PLANNING_FASTER 1.25
 #define HSEP_PLANNING_UNPROVEN 0.5
+#define HSEP_PLANNING_ENDS 5.0
 #define HSEP_PLANNING_PINNED_AVERAGED 24
 
 /* hybridsep/compensate/stop.py */

@@ -198,12 +198,13 @@ HSEP_API void hsep_planner_follow_friction(hsep_planner *self)
     (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED + self->n_pinned, hsep_at(self, self->third));
 }
 
-HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first)
+/* Add the jerk's cost of the splines first ... n - 1 to theirs, and make P positive definite. */
+static void planner_complete(hsep_planner *self, hsep_int first, hsep_real jerk_weight)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int n = splines->n - first;
     hsep_real *P = hsep_planner_quadratic(self, first), *diagonal = P, largest = 0.0;
-    hsep_splines_add_jerk(splines, self->jerk_weight, hsep_at(self, self->third), first, P, hsep_planner_linear(self));
+    hsep_splines_add_jerk(splines, jerk_weight, hsep_at(self, self->third), first, P, hsep_planner_linear(self));
     for (hsep_int i = 0; i < n; i++) {
         largest = hsep_fmax(largest, *diagonal);
         diagonal += n - i;
@@ -212,6 +213,11 @@ HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first)
         *P += HSEP_SPLINES_RIDGE * largest;
         P += n - i;
     }
+}
+
+HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first)
+{
+    planner_complete(self, first, self->jerk_weight);
 }
 
 HSEP_API void hsep_planner_aim(
@@ -269,6 +275,29 @@ HSEP_API void hsep_planner_pin(hsep_planner *self)
     for (hsep_int j = first; j < n; j++) {
         v[j - first] = v[j];
     }
+}
+
+HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    const hsep_real *b = hsep_splines_shape(splines), *c = hsep_at(self, self->c);
+    const hsep_int n = splines->n, spacing = splines->spacing, width = 4 * spacing;
+    hsep_real *P = hsep_at(self, self->P), *v = hsep_planner_linear(self);
+    self->change = 1.0;
+    hsep_planner_open(self, x_d);
+    for (hsep_int i = 0; i < n; i++) { /* products of splines; v: less what is decided, times each */
+        for (hsep_int j = i; j < n; j++) {
+            const hsep_int apart = (j - i) * spacing;
+            *P++ = apart < width ? hsep_dot(b, b + apart, width - apart) : 0.0;
+        }
+        v[i] = 0.0;
+        for (hsep_int k = i * spacing; k < HSEP_N_DECIDED * spacing; k++) {
+            v[i] -= b[k - i * spacing] * hsep_splines_sum(splines, c, HSEP_N_DECIDED, k);
+        }
+    }
+    const hsep_real gain = 2.0 * hsep_sin(0.5 * HSEP_TWO_PI * HSEP_PLANNING_ENDS / (hsep_real)splines->preview);
+    planner_complete(self, 0, hsep_pow(gain, -6.0)); /* gain of a difference at that period */
+    hsep_planner_pin(self);
 }
 
 HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)

@@ -101,6 +101,11 @@ HSEP_API void hsep_planner_gram(
 /* Reduce that cost to the splines that are not pinned. */
 HSEP_API void hsep_planner_pin(hsep_planner *self);
 
+/* Open a plan that ends compensation, with the cost of the splines that are not pinned: of delta itself, and of its
+ * jerk, which makes it as smooth as a short part of a plan allows. x_d: as hsep_planner_open has it. Cost: 15 preview
+ * multiply-adds and those of hsep_planner_pin. */
+HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
+
 /* The cost 1/2 c' P c - v' c of the splines first ... n - 1, for a caller that sets it itself: the triangle P of n -
  * first rows, and v, (n - first,), m; hsep_planner_complete adds the jerk's and makes P positive definite. */
 HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first);
