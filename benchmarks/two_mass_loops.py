@@ -3,8 +3,8 @@
     python -m benchmarks.two_mass_loops [--n 60] [--seed 2] [--only TEXT]      (ten minutes)
 
 RMS and largest of the tracking error of the true position, relative to no compensation, and the largest relative to
-that with ``compensate = physics``; without the samples of the last preview, whose trajectory ends while it moves. Warm:
-with weights that were learned from a run without compensation.
+that with ``compensate = physics``; errors and limits are without the last preview, as the trajectory breaks off while
+it moves, which no limit allows. Warm: with weights that were learned from a run without compensation.
 """
 
 import argparse
@@ -49,7 +49,8 @@ def trajectory(recipe: Recipe) -> Array:
 def machine_of_drive(recipe: Recipe) -> Machine:
     """Return a drive's physics model, and limits which leave something to those of its trajectory.
 
-    The settings are those that ``fit`` writes where it is given these limits; the change may be twice the servo error.
+    The settings are those that ``fit`` writes where it is given these limits, but for ``following_error_max``, which is
+    off; the change may be twice the servo error.
     """
     T_s, hold, x_d, Np = recipe.axis.T_s, recipe.settings.input_hold, trajectory(recipe), recipe.settings.Np
     error = x_d - TwoMassDrive(recipe.axis, float(x_d[0])).run(x_d)

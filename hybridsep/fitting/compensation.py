@@ -228,9 +228,9 @@ class Tracking:
         ]
         if self.change_max is not None:
             lines[-1] += (
-                " For a program whose largest servo error is above the log's, set it to twice that error, and "
-                f"following_error_max to {_FOLLOWING_ERROR:g} times it; motion more than 1.25 times as fast as all "
-                "that was learned may use half of change_max at first."
+                " For a program whose largest servo error is above the log's, set change_max to twice that error and "
+                f"following_error_max to {_FOLLOWING_ERROR:g} times that error; motion more than 1.25 times as fast as "
+                "all that was learned may use half of change_max at first."
             )
         if self.change_max is not None and self.change_max < self.largest:
             left = shown.words(self.largest - self.change_max, ".4g")
