@@ -220,8 +220,9 @@ this share of ``change_max`` only. ``change_max`` is to be twice the largest err
 error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
 may change it by all of ``change_max`` where weights of earlier runs judge it."""
 
-_ENDS = 5.0
-"""Periods in a plan of the change whose jerk weighs as much as the change itself in a plan that ends compensation."""
+_ENDS, _NEW = 5.0, 1e9
+"""Periods in a plan of the change whose jerk weighs as much as the change itself in a plan that ends compensation; and
+the factor of what it may be behind the last plan, so that it is nothing there and ends as soon as the remainder."""
 
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
@@ -295,13 +296,16 @@ class AveragedPlanning(Planning):
     def ending(self, preview: Preview) -> Array:
         """Return the coefficients, ``(3 + n_free,)``, m, of a plan that ends compensation, smoothly and soon.
 
-        It has the least change of the command that its jerk and the drive's limits allow; where there is none, the
-        remainder of the last plan goes on.
+        It has the least change of the command that its jerk and the drive's limits allow, and ends where the last plan
+        does; where there is none, the remainder of that goes on.
         """
         decided, last = np.split(preview.previous_plan, [N_DECIDED])
         at_once, nothing = np.eye(1, self.horizon)[0], np.zeros(self.horizon)
         jerk_weight = (2.0 * math.sin(math.pi * _ENDS / self.horizon)) ** -6.0
         cost = self.basis.cost(at_once, nothing, nothing, decided, preview.delta_before, jerk_weight)
+        cost.P[np.diag_indices(len(last))] *= np.where(
+            np.arange(len(last)) < len(last) - self.Np // self.spacing, 1.0, _NEW
+        )
         found = solve(cost, self.limits(preview), last, self.n_pinned, always=True, tolerance=TOLERANCE)
         return preview.previous_plan if found is None else np.concatenate((decided, found.x))
 

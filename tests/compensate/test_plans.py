@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from compensator_cases import MODEL, TS, compensator, move, plant
+from compensator_cases import DRIVE_LIMITS, MODEL, TS, compensator, move, plant
 from hypothesis import given
 from hypothesis import strategies as st
 from oracle import clarabel_minimum
@@ -173,6 +173,34 @@ def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pyt
     assert sep.plan(ahead[:200]).state is SepState.PHYSICS
     monkeypatch.setattr("hybridsep.compensate.planning.solve", lambda *_, **__: None)
     assert sep.plan(ahead[:200]).state is SepState.OFF
+
+
+@pytest.mark.parametrize("limits", [DRIVE_LIMITS, None], ids=["limits", "none"])
+def test_compensation_ends_by_the_least_change_that_its_jerk_allows(limits: Limits | None) -> None:
+    sep = compensator(limits=limits, averaging=True, Np=20, p=5)
+    for _ in range(2):  # of a command that moves away
+        sep.plan(move(240)[20:220])
+        sep.update(np.zeros(20))
+    basis, last = sep._basis, sep._previous_plan
+    sep.change(compensate="off", change_max=None)
+    sep.plan(np.zeros(200))
+    assert sep._pending is not None
+    found, n, new = sep._pending.coefficients, 3 + 5, 10  # splines that are decided or pinned; behind the last plan
+    third = np.diff(np.concatenate((np.zeros((3, basis.values.shape[1])), basis.values)), 3, axis=0)
+    before = np.diff(np.concatenate((sep._delta_before, np.zeros(200))), 3)
+    weight = (2.0 * np.sin(np.pi * 5.0 / 200)) ** -3.0
+    A, b = np.concatenate((basis.values, weight * third)), np.concatenate((np.zeros(200), -weight * before))
+    least = np.linalg.lstsq(A[:, n:-new], b - A[:, :n] @ last[:n], rcond=None)[0]
+    np.testing.assert_array_equal(found[:n], last[:n])
+    if limits is None:
+        np.testing.assert_allclose(found[n:-new], least, rtol=0, atol=1e-7 * np.abs(last).max())
+    np.testing.assert_allclose(found[-new:], 0.0, atol=1e-12)
+    changes = np.abs(basis.values @ found), np.abs(basis.values @ last)
+    assert changes[0][:20].max() > 1e-5
+    assert changes[0][100:].max() < 0.05 * changes[1][100:].max()
+    sep.update(np.zeros(20))
+    sep.plan(np.zeros(200))  # the rest of it follows
+    np.testing.assert_array_equal(sep._pending.coefficients[:-10], found[10:])
 
 
 # When the paper's model plans ----------------------------------------------------------------------------------------

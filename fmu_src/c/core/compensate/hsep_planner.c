@@ -297,6 +297,9 @@ HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
     }
     const hsep_real gain = 2.0 * hsep_sin(0.5 * HSEP_TWO_PI * HSEP_PLANNING_ENDS / (hsep_real)splines->preview);
     planner_complete(self, 0, hsep_pow(gain, -6.0)); /* gain of a difference at that period */
+    for (hsep_int i = n - self->Np / spacing; i < n; i++) {
+        *hsep_planner_quadratic(self, i) *= HSEP_PLANNING_NEW;
+    }
     hsep_planner_pin(self);
 }
 

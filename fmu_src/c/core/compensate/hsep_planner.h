@@ -102,8 +102,8 @@ HSEP_API void hsep_planner_gram(
 HSEP_API void hsep_planner_pin(hsep_planner *self);
 
 /* Open a plan that ends compensation, with the cost of the splines that are not pinned: of delta itself, and of its
- * jerk, which makes it as smooth as a short part of a plan allows. x_d: as hsep_planner_open has it. Cost: 15 preview
- * multiply-adds and those of hsep_planner_pin. */
+ * jerk, which makes it as smooth as a short part of a plan allows. It ends where the last plan does. x_d: as
+ * hsep_planner_open has it. Cost: n^2 / 2 and 15 preview multiply-adds, and those of hsep_planner_pin. */
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
 
 /* The cost 1/2 c' P c - v' c of the splines first ... n - 1, for a caller that sets it itself: the triangle P of n -
