@@ -24,7 +24,8 @@ from pathlib import Path
 
 from ..base.files import data_folder
 from ..base.parameters import angular_unit
-from .variables import FMI_VERSIONS, INTERPOLATED, FmuTable, Value, Variable
+from . import FMI_VERSIONS
+from .variables import INTERPOLATED, FmuTable, Value, Variable
 
 _MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}
 _ANY: Mapping[str, Value] = defaultdict(lambda: 1)

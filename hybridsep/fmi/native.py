@@ -17,6 +17,7 @@ from ..base.files import data_folder
 from ..base.signals import Array
 from ..base.version import __version__
 from ..plants.trajectory import spiral, staircase
+from . import FMI_VERSIONS
 from .c_header import FMI_HEADERS, TABLE_FILE, c_header, c_sources, fmi_headers, table_file
 from .compile import default_targets, libraries, placed
 from .description import (
@@ -32,7 +33,6 @@ from .description import (
 )
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
-from .variables import FMI_VERSIONS
 from .weights import WEIGHTS_FILE
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"

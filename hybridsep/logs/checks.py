@@ -42,8 +42,7 @@ ratio of two units within which it is meant."""
 _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 """Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit."""
 
-_START = 0.25
-"""Velocity between the first samples, relative to the largest, from which a start is in motion; EMPS has 0.12."""
+_START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
 
 _LATE = 0.1  # lag, s, from which it is noted: the look-ahead of a controller of which nothing is known
 

@@ -1,6 +1,7 @@
 """Machine files: TOML description of one axis for the library, the FMUs and the command line, in SI units.
 
 An invalid file is refused with a message that names the file, the entry, what was expected and what was found.
+The writer makes TOML with the unit of each entry as a comment.
 """
 
 import json
@@ -46,7 +47,7 @@ _NEEDED = {
 class Machine(FileSection):
     """One axis: identification, physics model, settings, plant if it has one; ``unit`` rad: every m stands for rad.
 
-    ``predictor`` and ``compensator`` are the entries that were given, by the names of the settings' fields.
+    Fields: the entries of :class:`FileSection`; ``predictor`` and ``compensator`` are those that were given, by name.
     """
 
     def __repr__(self) -> str:
