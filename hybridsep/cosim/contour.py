@@ -15,7 +15,6 @@ from ..plants.path import PlanarPath, Points
 from .run import Run
 
 _REACH = 0.1  # s to either side in which the nearest part of the path is looked for: more than any drive lags behind
-
 _FINER = 16  # parts into which a sample of the path near a point is cut: at 10 m/s² and 1 ms chords are within 5 nm
 
 

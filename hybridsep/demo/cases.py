@@ -85,8 +85,7 @@ def spiral_case(out: Path, advance: Advance) -> Summary:
         case["verdict"] = str(verdict_of(run))
         for name, off in (("friction_alone", "kappa"), ("stiffness_alone", "f")):
             advance(f"{label}, {name.replace('_', ' ')}")
-            single = cosimulate(*fmus, command, controller_values=values, plant_values={off: 0.0})
-            case[name] = single.summary()
+            case[name] = cosimulate(*fmus, command, controller_values=values, plant_values={off: 0.0}).summary()
         run.save(out / f"spiral_{axis}.csv")
         title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
         prediction_figure(run, title, out / f"spiral_{axis}.png")

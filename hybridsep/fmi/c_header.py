@@ -265,7 +265,6 @@ def table_file(table: FmuTable, guid: str) -> bytes:
     layout = layout_of(table.variables)
     starts = struct.pack(f"<{len(layout.starts)}d", *layout.starts)
     size = _HEAD.size + len(starts) + _CHECKSUM.size
-    n_modes = len(layout.modes) // 4
-    numbers = size, _interface_number(table.kind), n_modes, int(table.is_angular), layout.window
+    numbers = size, _interface_number(table.kind), len(layout.modes) // 4, int(table.is_angular), layout.window
     content = _HEAD.pack(_MAGIC, *numbers, guid.encode()) + starts
     return content + _CHECKSUM.pack(zlib.crc32(content))

@@ -106,7 +106,6 @@ def _weights(name: str, content: bytes | None) -> str:
 
 
 CONFIGURATION_FILE = "CustomFMU_hybridsep.xml"  # beside the archives, where the template has another name
-
 DEFINITIONS = ("HSEP_NO_FILES", "HSEP_NO_STDIO")  # macros: the runtime opens no files, and has printf in part only
 
 

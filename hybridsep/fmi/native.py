@@ -54,8 +54,7 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
     if spec.weights is not None:
         content[f"resources/{WEIGHTS_FILE}"] = spec.weights
     reference = reference_run(spec)
-    dependencies = filled("native_dependencies.txt")
-    content |= documentation(spec, needs, dependencies, reference, sources=compile_note(name, fmi))
+    content |= documentation(spec, needs, filled("native_dependencies.txt"), reference, sources=compile_note(name, fmi))
     guid = content_guid(content, table)
     content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
     content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, spec.weights if embed_weights else None).encode()

@@ -39,8 +39,7 @@ _NAMESPACES = {
 @dataclass(frozen=True)
 class _Component:
     name: str
-    # files below ``resources/``
-    fmu: str
+    fmu: str  # file below ``resources/``, as the parameter set
     parameter_set: str
     variables: tuple[Variable, ...]  # its table; the inputs and outputs become connectors, parameters its parameter set
 

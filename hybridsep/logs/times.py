@@ -16,11 +16,9 @@ _CLOCKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": _D
 """Units, s, that a column of times may be in which states none and is not in seconds."""
 
 _PLAUSIBLE = (2e-6, 0.5)  # intervals, s, of a log of an axis; beyond, a unit of times that is not stated is unknown
-
 _COUNTED = 10  # fewest times whose unit is doubted: two or three seconds are no index yet
 
 NOT_LATER = 0.05  # share of times not above the one before from which they are too coarse to tell an interval or a gap
-
 _RESOLVED = 0.2  # largest resolution of times of single precision, in intervals, with which they tell a gap
 
 _GAP, _LATE, _AROUND = 1.5, 0.6, 9
