@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 from .errors import FmuError, ParameterError
 
-_STEP_MAX = 100.0
-"""Longest communication step, s, which bounds the cost of one step: 10⁷ samples at the shortest ``T_s``."""
+_STEP_MAX = 100.0  # longest communication step, s, which bounds the cost of one: 10⁷ samples at the shortest ``T_s``
 
 _TOLERANCE = 0.05  # of T_s: the importer's times may be whole nanoseconds or in single precision
 _SPACINGS = 8.0  # ulp(t): a few roundings of the importer's arithmetic

@@ -23,8 +23,7 @@ PREDICTION_MAX = 1e100
 squares of smaller values cannot overflow."""
 
 
-_SI = ("", "m", "meter", "metre", "rad", "radian", "dimensionless")
-"""Spellings of the units in which a quantity is taken as it is."""
+_SI = ("", "m", "meter", "metre", "rad", "radian", "dimensionless")  # units of a quantity that is taken as it is
 
 _GAP = 1.5  # usual steps of an index from which on samples are missing in it
 

@@ -84,8 +84,7 @@ def restoring(kind: str) -> Iterator[None]:
 
 _Record = TypeVar("_Record")
 
-FIXED: Mapping[str, Any] = {"fixed": True}
-"""Metadata of a field that follows from parameters: it is no part of what is saved."""
+FIXED: Mapping[str, Any] = {"fixed": True}  # metadata of a field that follows from parameters: it is not saved
 
 
 def _leaves(record: Any, path: str = "") -> Iterator[tuple[str, Any]]:

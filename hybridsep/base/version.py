@@ -7,8 +7,7 @@ __version__ = "0.1.0"
 VERSION_DATE = "2026-11-24"
 """Day of the version, or while it is unreleased of its last renewal; FMUs name it as the day of their generation."""
 
-COMMIT_FILE = "hybridsep/_data/commit.txt"
-"""Where wheel and sdist keep their commit, which ``hatch_build.py`` writes into them."""
+COMMIT_FILE = "hybridsep/_data/commit.txt"  # where wheel and sdist keep their commit, written by ``hatch_build.py``
 
 _ROOT = Path(__file__).resolve().parents[2]
 

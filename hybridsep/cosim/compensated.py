@@ -20,8 +20,7 @@ _TRAINING_SEED = 1000  # noise seed of the training run of a warm compensator; n
 COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
 """Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.figures.CASES`: value of ``compensate``."""
 
-RIVAL = "fir_inverse"
-"""Key of the rival of :class:`~hybridsep.cosim.inverse.FirInverse`, fitted to the first run of ``off``."""
+RIVAL = "fir_inverse"  # key of :class:`~hybridsep.cosim.inverse.FirInverse`, fitted to the first run of ``off``
 
 Runs = dict[str, Run]
 

@@ -14,11 +14,8 @@ from ..base.signals import Array
 from ..plants.path import PlanarPath, Points
 from .run import Run
 
-_REACH = 0.1
-"""Time to either side in which the nearest part of the path is looked for, s: more than any drive lags behind."""
-
-_FINER = 16
-"""Parts of a sample that the path near a point is divided into: at 10 m/s² and 1 ms its chords are within 5 nm."""
+_REACH = 0.1  # s to either side in which the nearest part of the path is looked for: more than any drive lags behind
+_FINER = 16  # parts into which a sample of the path near a point is cut: at 10 m/s² and 1 ms chords are within 5 nm
 
 
 @dataclass(frozen=True)

@@ -332,8 +332,8 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         return self._call(getattr(self.slave, f"{verb}{self._version.state}"), *arguments)
 
     def _call(self, function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
-        """Call a function that was made for this instance, if it is still open."""
-        _ = self.slave
+        """Call a function of the instance; FmuError if it is closed or refuses."""
+        _ = self.slave  # raises if closed
         try:
             return function(*arguments, **keywords)
         except (FMICallException, OSError) as error:  # on Windows ctypes raises OSError where others have a signal

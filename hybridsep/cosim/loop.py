@@ -5,6 +5,7 @@ and ``x_d_ahead = r(k)``; then both step. The controller delays the trajectory, 
 samples more, and a run is recorded without the first fill. If the controller has a ``measurement_delay``, what is
 measured arrives that many samples later; a run has it as it was measured. With −1 it arrives a sample early: the drive
 steps before the controller, as under a sequential (Gauss-Seidel) master.
+Adapters: ``FmuController``, ``_LibraryController``, ``_OwnController``; ``FmuDrive``, ``_LibraryDrive``.
 """
 
 import math
@@ -167,8 +168,8 @@ def _refuse(given: object, message: str) -> None:
 
 # Adapters -------------------------------------------------------------------------------------------------------------
 #
-# Of a controller and of a drive, each an FMU or an object of the library or your own. Those of one kind have the same
-# attributes and methods, which the FMUs' say; what an FMU reports of itself is known after ``initialise``.
+# A controller's adapter has ``kind``, ``T_s``, ``Np``, ``delay`` and ``late``, a drive's ``T_s`` and ``plant``; both
+# have ``name`` and the methods that the FMUs' describe. What an FMU reports is known after ``initialise``.
 
 
 class _LibraryController:

@@ -1,6 +1,6 @@
 """The paper's cases, predicted and compensated, FMU against FMU: what ``hybridsep demo`` runs, scores and draws.
 
-Its tables, as the command prints them, are on the index page of its folder, too, which needs no network.
+``index.html`` shows the tables that the command prints, without a network.
 """
 
 import json
@@ -26,8 +26,7 @@ from ..plants.trajectory import spiral, staircase
 
 Summary = dict[str, dict[str, Any]]
 
-MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral_y": "als25010_y"}
-"""The machine of each case."""
+MACHINES = {"staircase": "spring_mass_damper", "spiral_x": "als25010_x", "spiral_y": "als25010_y"}  # of each case
 
 PRINTED = {
     "staircase": {"rms_pb_um": 33.7, "rms_h_um": 14.7, "reduction_percent": 56.4},
@@ -86,8 +85,7 @@ def spiral_case(out: Path, advance: Advance) -> Summary:
         case["verdict"] = str(verdict_of(run))
         for name, off in (("friction_alone", "kappa"), ("stiffness_alone", "f")):
             advance(f"{label}, {name.replace('_', ' ')}")
-            single = cosimulate(*fmus, command, controller_values=values, plant_values={off: 0.0})
-            case[name] = single.summary()
+            case[name] = cosimulate(*fmus, command, controller_values=values, plant_values={off: 0.0}).summary()
         run.save(out / f"spiral_{axis}.csv")
         title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
         prediction_figure(run, title, out / f"spiral_{axis}.png")
@@ -157,6 +155,9 @@ def demo(
     write_page(out, summary, demo_files(out, full=full))
     progress("done", 1.0)
     return summary
+
+
+# Page -----------------------------------------------------------------------------------------------------------------
 
 
 class Table(NamedTuple):

@@ -21,9 +21,7 @@ WINDOWS_ENOUGH = 20
 
 _LEAST_SHARE = 0.01  # share of the samples from which on a place is judged
 STANDSTILL = 1e-3  # commanded motion of a sample, relative to the largest, below which the axis is at rest
-
-_UNSTABLE = 3.0
-"""Largest change of the prediction, relative to the largest residual, from which on the model counts as unstable."""
+_UNSTABLE = 3.0  # largest change of the prediction, relative to the largest residual; beyond, the model is unstable
 
 _N_EARLY = 10  # windows that count as the beginning of a run
 

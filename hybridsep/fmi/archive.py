@@ -15,17 +15,15 @@ from numpy.typing import ArrayLike
 from ..base.errors import FmuError
 from ..base.files import atomic_open
 from ..machines.machine import Machine
-from . import native, python
+from . import FLAVOURS, FMI_VERSIONS, native, python
 from .compile import ALL_TARGETS, default_targets, expanded
 from .spec import FmuSpec, fmu_name, fmu_names
-from .variables import FLAVOURS, FMI_VERSIONS
 from .weights import saved_weights
 
 _ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
 
-_LEVEL = 6
-"""Of zlib's deflate; fixed, as another level, like another implementation, gives other bytes for the same content."""
+_LEVEL = 6  # of zlib's deflate; fixed, as another one, like another implementation, gives other bytes
 
 
 def build_fmu(

@@ -24,7 +24,8 @@ from pathlib import Path
 
 from ..base.files import data_folder
 from ..base.parameters import angular_unit
-from .variables import FMI_VERSIONS, INTERPOLATED, FmuTable, Value, Variable
+from . import FMI_VERSIONS
+from .variables import INTERPOLATED, FmuTable, Value, Variable
 
 _MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}
 _ANY: Mapping[str, Value] = defaultdict(lambda: 1)
@@ -264,7 +265,6 @@ def table_file(table: FmuTable, guid: str) -> bytes:
     layout = layout_of(table.variables)
     starts = struct.pack(f"<{len(layout.starts)}d", *layout.starts)
     size = _HEAD.size + len(starts) + _CHECKSUM.size
-    n_modes = len(layout.modes) // 4
-    numbers = size, _interface_number(table.kind), n_modes, int(table.is_angular), layout.window
+    numbers = size, _interface_number(table.kind), len(layout.modes) // 4, int(table.is_angular), layout.window
     content = _HEAD.pack(_MAGIC, *numbers, guid.encode()) + starts
     return content + _CHECKSUM.pack(zlib.crc32(content))

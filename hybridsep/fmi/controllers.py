@@ -27,8 +27,7 @@ from .weights import WEIGHTS_FILE
 COMPONENTS = {"SepCompensator": "hsep", "HybridPredictor": "hsep_predictor"}  # name of the component of each model
 
 
-_NAME_MAX = 47 - len("..look-ahead")
-"""Letters that HAL leaves for the names of component and axis together: 47, less the longest pin's."""
+_NAME_MAX = 47 - len("..look-ahead")  # letters of component and axis together: HAL's 47, less the longest pin's
 
 
 def check_names(model: str, names: Sequence[str]) -> None:
@@ -106,11 +105,8 @@ def _weights(name: str, content: bytes | None) -> str:
     return f"/* What an earlier run has learned. */\n{learned}\n{size} sizeof {name}_weights;"
 
 
-CONFIGURATION_FILE = "CustomFMU_hybridsep.xml"
-"""Beside the archives; another name than the template's, which lies where the file goes."""
-
-DEFINITIONS = ("HSEP_NO_FILES", "HSEP_NO_STDIO")
-"""Macros of the compilation: the runtime opens no files, and has printf in part only."""
+CONFIGURATION_FILE = "CustomFMU_hybridsep.xml"  # beside the archives, where the template has another name
+DEFINITIONS = ("HSEP_NO_FILES", "HSEP_NO_STDIO")  # macros: the runtime opens no files, and has printf in part only
 
 
 def write_configuration(out: Path, fmi: str) -> Path:

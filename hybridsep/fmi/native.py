@@ -17,6 +17,7 @@ from ..base.files import data_folder
 from ..base.signals import Array
 from ..base.version import __version__
 from ..plants.trajectory import spiral, staircase
+from . import FMI_VERSIONS
 from .c_header import FMI_HEADERS, TABLE_FILE, c_header, c_sources, fmi_headers, table_file
 from .compile import default_targets, libraries, placed
 from .description import (
@@ -32,7 +33,6 @@ from .description import (
 )
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
-from .variables import FMI_VERSIONS
 from .weights import WEIGHTS_FILE
 
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
@@ -54,8 +54,7 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
     if spec.weights is not None:
         content[f"resources/{WEIGHTS_FILE}"] = spec.weights
     reference = reference_run(spec)
-    dependencies = filled("native_dependencies.txt")
-    content |= documentation(spec, needs, dependencies, reference, sources=compile_note(name, fmi))
+    content |= documentation(spec, needs, filled("native_dependencies.txt"), reference, sources=compile_note(name, fmi))
     guid = content_guid(content, table)
     content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
     content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, spec.weights if embed_weights else None).encode()

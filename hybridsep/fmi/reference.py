@@ -30,14 +30,10 @@ AGREEMENT: Mapping[str, int] = {"SepCompensator": 9}
 
 _SAMPLES = 600  # length of a run; a look-ahead's is longer if its fill and warm-up are
 _COMPENSATED_SAMPLES = 750  # length of a compensator's run: the hybrid model has planned half of it, on all machines
-
 _SAMPLES_MAX = 3000
 _WINDOW_MAX = 1000  # longest look-ahead with a reference, samples: with a longer one no short run contains a prediction
 _RESOLUTION = 9  # decimals of an input, m; the result is computed from the rounded values
-
-_RESULT_RESOLUTION = 11
-"""Decimals of a result: what platforms agree on, so that an archive has the same bytes wherever it is built."""
-
+_RESULT_RESOLUTION = 11  # decimals of a result that platforms agree on: an archive has the same bytes wherever built
 _REL_TOL = 1e-4
 _GAIN, _NOISE_STD = 1.02, 5e-6
 

@@ -5,6 +5,7 @@ import json
 import uuid
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -17,7 +18,8 @@ from ..machines.machine import PAPER_SETTINGS, Machine
 from ..machines.sections import FeedDriveSection, IdentifiedSection
 from ..model.physics import ModalModel
 from ..plants.trajectory import staircase
-from .variables import FLAVOURS, FMI_VERSIONS, SAMPLES_TRAJECTORY, FmuTable
+from . import FLAVOURS, FMI_VERSIONS
+from .variables import SAMPLES_TRAJECTORY, FmuTable
 
 AUTHOR = "the hybridsep authors"
 COPYRIGHT = f"Copyright (c) 2026, {AUTHOR}"  # the line of LICENSE
@@ -80,7 +82,7 @@ class FmuSpec:
         settings = ", ".join(f"{name} = {json.dumps(value)}" for name, value in PAPER_SETTINGS[machine.name].items())
         return f"{title}; the paper's settings are {settings}"
 
-    @property
+    @cached_property
     def stop_time(self) -> float:
         """End of the default experiment, s: of the samples, or of the machine's trajectory, after the look-ahead.
 

@@ -17,11 +17,11 @@ from ..base.files import atomic_open
 from ..base.signals import as_samples
 from ..base.version import __version__
 from ..machines.machine import Machine
-from . import native
+from . import FMI_VERSIONS, native
 from .archive import archived
 from .description import described_variables, document, unit_elements
 from .spec import FmuSpec
-from .variables import FMI_VERSIONS, Variable
+from .variables import Variable
 from .weights import saved_weights
 
 SSP_VERSIONS = ("1", "2")  # SSP 1.0 with FMI 2.0 FMUs, SSP 2.0 with FMI 3.0 FMUs; the default first
@@ -39,8 +39,7 @@ _NAMESPACES = {
 @dataclass(frozen=True)
 class _Component:
     name: str
-    # files below ``resources/``
-    fmu: str
+    fmu: str  # file below ``resources/``, as the parameter set
     parameter_set: str
     variables: tuple[Variable, ...]  # its table; the inputs and outputs become connectors, parameters its parameter set
 

@@ -14,9 +14,6 @@ from typing import Any
 from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, CompensatorSettings, PredictorSettings, check
 
-FLAVOURS = ("native", "python")  # of FMUs; the default first
-FMI_VERSIONS = ("2", "3")  # FMI 2.0 and FMI 3.0; the default first
-
 Value = float | int | bool  # a start value
 
 MODE = ("f_n", "zeta", "alpha", "beta")  # numbers of a mode of eq. (15)
@@ -258,7 +255,7 @@ def _plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[st
     ]
 
 
-def _trajectory_variables(parameters: Mapping[str, Value], _modes: Sequence[Mapping[str, float]]) -> list[Variable]:
+def _trajectory_variables(parameters: Mapping[str, Value], _unused: Sequence[Mapping[str, float]]) -> list[Variable]:
     """Return the table of the ReferenceTrajectory, which has no modes."""
     meaning = "commanded position at t; wire it to x_d_ahead"
     return [

@@ -127,7 +127,7 @@ def warm_predictor(machine: "Machine", weights: str | Path | None) -> HybridPred
 
 
 def saved_weights(path: str | Path | None, machine: "Machine", kind: str) -> bytes | None:
-    """Return the file's content for the predictor that :meth:`HybridPredictor.save` wrote; None without one.
+    """Return weights.bin for a predictor saved by :meth:`HybridPredictor.save`; None where ``path`` is None.
 
     It must have been trained for the machine: with its ``input_hold``, modes, and all settings on which weights depend
     (:func:`_learned_settings`), its predictor's or compensator's as ``kind`` says. Its window may be another one:

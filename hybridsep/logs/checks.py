@@ -42,9 +42,7 @@ ratio of two units within which it is meant."""
 _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 """Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit."""
 
-_START = 0.25
-"""Velocity between the first samples, relative to the largest, from which a start is in motion; EMPS has 0.12."""
-
+_START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
 _LATE = 0.1  # lag, s, from which it is noted: the look-ahead of a controller of which nothing is known
 
 _ALONE, _SIZE = 10.0, 0.02
@@ -164,8 +162,7 @@ def _unit(log: Log) -> Iterator[Finding]:
         f"read in m, {travel:.4g} m of travel and {usual:.4g} m/s² of acceleration are more than a feed axis has: "
         "the positions are rather in mm, µm (--unit um) or, of a rotary axis, deg"
     )
-    evidence = {"travel": travel, "acceleration": usual}
-    yield Finding("unit", words, evidence, refused=True, options=UNIT_OPTIONS)
+    yield Finding("unit", words, {"travel": travel, "acceleration": usual}, refused=True, options=UNIT_OPTIONS)
 
 
 class _Following(NamedTuple):
@@ -182,8 +179,7 @@ def following(u: Array, x: Array) -> _Following:
     """Return how ``x``, (n,), NaN where it is missing, follows ``u``, (n,), which was at rest before."""
     known = np.isfinite(x)
     largest = min(_LAG_MAX, len(u) // 4)
-    lags = np.unique(np.round(np.geomspace(1.0, max(largest, 1), _LAGS)).astype(np.intp))
-    lags = np.concatenate(([0], lags))
+    lags = np.concatenate(([0], np.unique(np.round(np.geomspace(1.0, max(largest, 1), _LAGS)).astype(np.intp))))
     k = np.arange(len(u))
     A = np.stack([u[np.maximum(k - lag, 0)] for lag in lags], axis=1)[known]
     A, y = A - A.mean(axis=0), x[known] - x[known].mean()
@@ -379,8 +375,7 @@ def _note_outliers(log: Log) -> Iterator[Finding]:
                 f"by up to {log.shown.words(height)}, first sample {wrong[0] + 1}: identified and judged as recorded; "
                 "blank in the file it counts as missing"
             )
-            evidence = {"n": float(len(wrong)), "largest": height}
-            yield Finding("outliers", words, evidence)
+            yield Finding("outliers", words, {"n": float(len(wrong)), "largest": height})
 
 
 def _spikes(x: Array, travel: float) -> tuple[Indices, Array]:

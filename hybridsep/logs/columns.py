@@ -17,9 +17,7 @@ _COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "
 """Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
 
 _GAP = 1.5  # intervals of the slower column between two samples of the faster one from which on the latter has a gap
-
-_SAME = 1e-6
-"""Largest difference of two channels' times, relative to their interval, at which they are the same: rounding."""
+_SAME = 1e-6  # largest difference of two channels' times, in intervals, at which they are the same: rounding
 
 
 @dataclass(frozen=True)

@@ -69,8 +69,7 @@ def controller_of(logs: Sequence[Log]) -> Controller | None:
 
     def behind(leader: str, follower: str, n: int) -> Array:
         """Return how far one signal is behind another that is taken ``n`` samples later."""
-        apart = [part[leader][: max(len(part["x"]) - n, 0)] - part[follower][n:] for part in parts]
-        joined = np.concatenate(apart)
+        joined = np.concatenate([part[leader][: max(len(part["x"]) - n, 0)] - part[follower][n:] for part in parts])
         return joined if math.isinf(turn) else joined - turn * np.round(joined / turn)  # where one has its jump first
 
     def lead(leader: str, follower: str) -> int | None:

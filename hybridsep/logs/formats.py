@@ -1,6 +1,6 @@
 """Registry of log formats: which reader a file's content asks for, and how to convert what has none.
 
-A new format is a file with a subclass of :class:`~hybridsep.logs.source.Source` and its entry in :data:`READERS`.
+A new format is a subclass of :class:`~hybridsep.logs.source.Source` and its entry in :data:`READERS`.
 Beside them lies the example log of the package, made by ``examples/example_log.py`` of the repository.
 """
 

@@ -27,23 +27,6 @@ from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated
 
 _OWN_NAMES = ("x_d", "x", "x_meas")  # names of columns of positions that leave no doubt
 
-_TURN = 2 * math.pi
-
-_JUMP = 3.0  # largest difference of a jump from a whole turn, in the largest steps that are no jumps
-_WITHIN = 1.05  # largest range, in turns, of a position modulo one turn with its noise
-
-_ONE_PHASE, _CHANGES = 0.95, 50
-"""Share of a slow sensor's changes that come in one sample of every n, which no other log of a hundred reached for any
-n, and fewest changes that show it."""
-
-_BRIDGED = 10
-"""Samples missing in a row that get rows of their own on request, a tenth of the default window: a command of 2 m/s² at
-1 kHz is interpolated within 0.3 µm over one of them, 30 µm over ten."""
-
-_UNEVEN = 0.05
-"""Relative difference of an interval from the log's from which it counts as uneven: at a feed rate of 80 mm/s and
-1 kHz, 5 % of an interval are 4 µm of travel, comparable to the noise of an encoder."""
-
 
 class Table(Protocol):
     """Table of named columns, as pandas' and polars' DataFrame."""
@@ -305,15 +288,32 @@ def check_reading(unit: str | None, T_s: float | None) -> float | None:
 
 # Changes --------------------------------------------------------------------------------------------------------------
 
+_TURN = 2 * math.pi
+
+_JUMP = 3.0  # largest difference of a jump from a whole turn, in the largest steps that are no jumps
+_WITHIN = 1.05  # largest range, in turns, of a position modulo one turn with its noise
+
+_ONE_PHASE, _CHANGES = 0.95, 50
+"""Share of a slow sensor's changes that come in one sample of every n, which no other log of a hundred reached for any
+n, and fewest changes that show it."""
+
+_BRIDGED = 10
+"""Samples missing in a row that get rows of their own on request, a tenth of the default window: a command of 2 m/s² at
+1 kHz is interpolated within 0.3 µm over one of them, 30 µm over ten."""
+
+_UNEVEN = 0.05
+"""Relative difference of an interval from the log's from which it counts as uneven: at a feed rate of 80 mm/s and
+1 kHz, 5 % of an interval are 4 µm of travel, comparable to the noise of an encoder."""
+
 
 def _at(log: Log, which: slice | Indices) -> Log:
-    """Return some samples of a log; the segments remain where they are."""
+    """Return a log of some samples of another; the segments remain where they are."""
     signals = {what: values[which] for what, values in log.signals.items()}
     return replace(log, t=log.t[which], x_d=log.x_d[which], x_meas=log.x_meas[which], signals=signals)
 
 
 def whole_turns(given: Log) -> tuple[Log, str]:
-    """Return a rotary axis's samples without the jumps of positions modulo one turn."""
+    """Return a rotary axis's log without the jumps of positions modulo one turn."""
     jumps = [_turn_jumps(x) for x in (given.x_d, given.x_meas)]
     n = sum(map(len, jumps))
     if not n:
@@ -350,7 +350,7 @@ def _error(x_d: Array, x_meas: Array) -> float:
 
 
 def _at_sensor_phase(given: Log) -> tuple[Log, str]:
-    """Return the samples in which a slow sensor is new, where the measurement is renewed every n samples.
+    """Return the log of the samples in which a slow sensor is new, where the measurement is renewed every n samples.
 
     In a log of its controller's cycle such a sensor's position is held between; no model follows its steps.
     """
@@ -381,7 +381,7 @@ def _at_sensor_phase(given: Log) -> tuple[Log, str]:
 
 
 def _shifted(given: Log, delay: int) -> tuple[Log, str]:
-    """Return samples whose measured position was recorded ``delay`` samples too late, or too early if it is negative.
+    """Return the log with its measured position ``delay`` samples earlier, or later if that is negative.
 
     Of each segment the samples are left out at whose instants nothing was measured then.
 
@@ -407,7 +407,7 @@ def uneven(t: Array, T_s: float, starts: tuple[int, ...]) -> Indices:
 
 
 def _resampled(given: Log) -> tuple[Log, str]:
-    """Return samples at even times, linearly between the given ones, with rows of their own in short gaps.
+    """Return the log at even times, linearly between the given ones, with rows of their own in short gaps.
 
     The measured position is missing in these, NaN. Of each segment the times begin with its own first one.
     """
@@ -431,6 +431,7 @@ def _resampled(given: Log) -> tuple[Log, str]:
 
 
 def _joined(parts: list[Log]) -> Log:
+    """Return one log of several, each of which begins a segment."""
     starts = np.cumsum([0, *(len(part.t) for part in parts[:-1])])
     t, x_d, x_meas = (np.concatenate([getattr(part, what) for part in parts]) for what in ("t", "x_d", "x_meas"))
     signals = {what: np.concatenate([part.signals[what] for part in parts]) for what in parts[0].signals}

@@ -1,9 +1,10 @@
 """Recordings of a SINUMERIK: traces of Operate as XML ("SINUMERIK Solution Line Trace"), and Siemens Capture's JSON.
 
-How signals and their sample rates are chosen is described in Siemens' "SINUMERIK Operate Commissioning Manual", section
-"Trace". A file declares each signal with an ``interval`` and a ``datapointCount``, and has a ``rec`` for each time. A
-value that is as before is left out there, and a ``rec`` with none as well, so that a signal's samples are one in each
-interval from its first value on, each the last one written.
+The XML: how signals and their sample rates are chosen is said in Siemens' "SINUMERIK Operate Commissioning Manual",
+section "Trace". A file declares each signal with an ``interval`` and a ``datapointCount``, and has a ``rec`` for each
+time. A value that is as before is left out there, and a ``rec`` with none as well, so that a signal's samples are one
+in each interval from its first value on, each the last one written.
+Capture: the header has the signals and the cycle time, a row of HFData a number of each; events lie between the rows.
 """
 
 import json
@@ -30,13 +31,6 @@ _MEASURED = (re.compile(r"actpos", re.IGNORECASE), re.compile(r"measpos", re.IGN
 """Names of the signals of positions, the measured ones by precedence."""
 
 _NOT_A_NUMBER = 9.2188684e18  # values above are the bits of a NaN, written as a whole number: there is none
-
-_SIGNALS = b'"SignalListHFData"'  # in Capture's JSON
-_COUNTER = "CYCLE"
-_TIME = "t"  # name of the time column, which is made from the counter of cycles
-
-_ROTARY = ("A", "B", "C", "SP", "S")
-"""Beginnings of the names of rotary axes and spindles, whose positions are in degrees; others are in millimetres."""
 
 
 @dataclass
@@ -149,6 +143,14 @@ class SinumerikSource(ArraysSource):
             if there and _COMMANDED.search(signal.name):
                 found.setdefault(signal.axis, (x_d, there[0]))
         return found
+
+
+_SIGNALS = b'"SignalListHFData"'  # in the header of Capture's JSON
+_COUNTER = "CYCLE"
+_TIME = "t"  # name of the time column, which is made from the counter of cycles
+
+_ROTARY = ("A", "B", "C", "SP", "S")
+"""Beginnings of the names of rotary axes and spindles, whose positions are in degrees; others are in millimetres."""
 
 
 class CaptureSource(ArraysSource):

@@ -15,22 +15,17 @@ _DAY = 86_400.0
 _CLOCKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": _DAY}
 """Units, s, that a column of times may be in which states none and is not in seconds."""
 
-_PLAUSIBLE = (2e-6, 0.5)
-"""Intervals, s, of a log of an axis; where none is stated, the unit of the times is unknown beyond."""
-
+_PLAUSIBLE = (2e-6, 0.5)  # intervals, s, of a log of an axis; beyond, a unit of times that is not stated is unknown
 _COUNTED = 10  # fewest times whose unit is doubted: two or three seconds are no index yet
 
-NOT_LATER = 0.05
-"""Share of times not above the one before from which on they are rounded too coarsely to tell an interval or a gap."""
-
+NOT_LATER = 0.05  # share of times not above the one before from which they are too coarse to tell an interval or a gap
 _RESOLVED = 0.2  # largest resolution of times of single precision, in intervals, with which they tell a gap
 
 _GAP, _LATE, _AROUND = 1.5, 0.6, 9
 """Interval, in sampling intervals, from which samples are missing, or by which, less one, a clock was set back; how
 much later or earlier the times must stay then, and over how many samples: jitter does not last."""
 
-_TOLERANCE = 0.01
-"""Largest relative difference between a given interval and that of the times: more than any clock's drift."""
+_TOLERANCE = 0.01  # largest relative difference of a given interval from that of the times: more than a clock's drift
 
 _ROUNDING, _ERRORS, _ROUNDING_MAX = 1e-8, 3.0, 1e-4
 """Relative change by which an interval may be rounded at least, in standard errors, and at most."""

@@ -23,9 +23,7 @@ _MARKS = (b"\t", b";", b",")
 _NAME, _UNIT, _SAMPLE_TIME, _START = "Name", "Unit", "SampleTime[ms]", "Starttime of export"
 
 _HEAD_LINES = 400  # lines in which the numbers must begin
-
-_FILETIME, _COUNT, _MS = 1e12, 1e-7, 1e-3
-"""Times above the first are Windows file times, counted in the second, s; others in milliseconds."""
+_FILETIME, _COUNT, _MS = 1e12, 1e-7, 1e-3  # times above the first are Windows', in the second, s; others in ms
 
 
 @dataclass(frozen=True)

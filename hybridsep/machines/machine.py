@@ -1,6 +1,7 @@
 """Machine files: TOML description of one axis for the library, the FMUs and the command line, in SI units.
 
 An invalid file is refused with a message that names the file, the entry, what was expected and what was found.
+The writer makes TOML with the unit of each entry as a comment.
 """
 
 import json
@@ -46,7 +47,7 @@ _NEEDED = {
 class Machine(FileSection):
     """One axis: identification, physics model, settings, plant if it has one; ``unit`` rad: every m stands for rad.
 
-    ``predictor`` and ``compensator`` are the entries that were given, by the names of the settings' fields.
+    Fields: the entries of :class:`FileSection`; ``predictor`` and ``compensator`` are those that were given, by name.
     """
 
     def __repr__(self) -> str:
@@ -65,8 +66,7 @@ class Machine(FileSection):
             raise ParameterError("a plant of kind feed_drive needs [physics.spring_mass_damper]")
         if isinstance(self.plant, StageSection) and not self.physics.mode:
             raise ParameterError("a plant of kind stage needs [[physics.mode]] entries")
-        linear = isinstance(self.plant, FeedDriveSection | StageSection)
-        if linear and (self.unit != "m" or self.physics.dead_time):
+        if isinstance(self.plant, FeedDriveSection | StageSection) and (self.unit != "m" or self.physics.dead_time):
             raise ParameterError(
                 "a machine with a plant of kind feed_drive or stage must have unit = 'm' and physics.dead_time = 0"
             )
@@ -285,8 +285,7 @@ def _parsed(change: str) -> dict[str, Any]:
 def _with(table: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return tables with what changes in them."""
     both = [name for name, one in changes.items() if isinstance(one, Mapping) and isinstance(table.get(name), Mapping)]
-    inner = {name: _with(table[name], changes[name]) for name in both}
-    return {**table, **changes, **inner}
+    return {**table, **changes, **{name: _with(table[name], changes[name]) for name in both}}
 
 
 def machine_from_table(content: Mapping[str, Any]) -> Machine:

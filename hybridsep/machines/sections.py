@@ -3,14 +3,14 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, field, fields
+from functools import partial
 from typing import Any, TypeVar
 
 from ..base.errors import ParameterError, brief
 from ..base.parameters import Parameter
 from ..base.settings import PARAMETERS, Cascade, CompensatorSettings, Limits, PredictorSettings
 
-NAME_PATTERN = r"[A-Za-z][A-Za-z0-9_]{0,99}"
-"""Names of machines; they become parts of FMUs' names, of which importers make names of files."""
+NAME_PATTERN = r"[A-Za-z][A-Za-z0-9_]{0,99}"  # of machines; they are parts of FMUs' names, which become names of files
 
 _LINE = re.compile("[^\x00-\x1f\x7f\ufffe\uffff]+")
 """One line of printable text, of characters that XML 1.0 allows, for modelDescription and documentation."""
@@ -98,14 +98,10 @@ def _entry(read: Read, default: Any = MISSING, **more: Any) -> Any:
 def parameter_entry(name: str, default: Any = MISSING) -> Any:
     """Declare an entry that has the range of a parameter."""
     parameter = _DECLARED[name]
-
-    def read(value: Any, place: str, problems: list[str]) -> Any:
-        return _checked(parameter, value, name, place, problems)
-
-    return _entry(read, default, parameter=parameter)
+    return _entry(partial(_checked, parameter, name), default, parameter=parameter)
 
 
-def _checked(parameter: Parameter, value: Any, label: str, place: str, problems: list[str]) -> Any:
+def _checked(parameter: Parameter, label: str, value: Any, place: str, problems: list[str]) -> Any:
     try:
         return parameter.checked(value, label)
     except ParameterError as error:
@@ -149,11 +145,7 @@ def choice_entry(*choices: str, default: Any = MISSING) -> Any:
 
 def section_entry(kind: type[Section], default: Any = MISSING) -> Any:
     """Declare an entry that is a section."""
-
-    def read(value: Any, place: str, problems: list[str]) -> Any:
-        return read_section(kind, value, place, problems)
-
-    return _entry(read, default, sections=(kind,))
+    return _entry(partial(read_section, kind), default, sections=(kind,))
 
 
 def _modes_entry() -> Any:
@@ -181,7 +173,7 @@ def _settings_entry(known: Mapping[str, Parameter], check: Callable[[dict[str, A
         _refuse_unknown(value, by_entry, place, problems)
         for entry, (name, parameter) in by_entry.items():
             if value.get(entry) is not None:
-                found[name] = _checked(parameter, value[entry], entry, f"{place}.{entry}", problems)
+                found[name] = _checked(parameter, entry, value[entry], f"{place}.{entry}", problems)
         if len(problems) == before:
             try:
                 check(found)
@@ -343,7 +335,7 @@ def _own(settings: type[PredictorSettings | CompensatorSettings]) -> dict[str, P
 
 @dataclass(frozen=True, kw_only=True)
 class FileSection(Section):
-    """All entries of a machine file; what the section of the compensator leaves out is as the predictor's."""
+    """Top level of a machine file: its own entries and its sections; the compensator's default to the predictor's."""
 
     name: str = _text_entry(
         lambda value: isinstance(value, str) and bool(re.fullmatch(NAME_PATTERN, value)),

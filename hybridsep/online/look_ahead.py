@@ -24,8 +24,7 @@ from ..base.signals import Array, check_position
 from ..base.state import FIXED, arrays_of, pack, restored, restoring, unpack
 from ..predict.predictor import HybridPredictor
 
-_N_OVER = 3
-"""Samples in a row above the limit that trip: one or two may be outliers of the sensor. Missing ones do not count."""
+_N_OVER = 3  # samples in a row above the limit that trip, missing ones aside: one or two may be the sensor's outliers
 
 
 class SepState(IntEnum):

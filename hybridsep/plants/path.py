@@ -32,8 +32,7 @@ _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _WITHOUT_EFFECT = {17.0, 40.0, 43.0, 49.0, 54.0, 61.0, 61.1, 64.0, 80.0, 91.1, 94.0, 97.0}
 """G words that leave a planar path as it is: its plane, no offsets but the tool's length, path modes, units of F."""
 
-_IGNORED = frozenset("GMNOSTZHD")
-"""Letters of words that are not read as an argument; Z moves do not change the path in the plane."""
+_IGNORED = frozenset("GMNOSTZHD")  # letters of words that are not read; Z moves do not change the path in the plane
 
 _ROUNDED = 5e-6  # distance up to which the two radii of an arc, or two centres, are the same one rounded, m
 

@@ -18,11 +18,8 @@ from ..base.signals import Array, as_samples
 
 INTERNAL_STEP = 1e-4  # longest internal integration step, s: 0.1 ms, a tenth of the usual sampling interval
 
-RATE_MAX = 1e5
-"""Fastest rate of a drive's linear part, 1/s: a time constant of 10 µs takes 1600 internal steps per millisecond."""
-
-STATE_MAX = 1e100
-"""Largest magnitude of a drive's state; beyond it the state counts as overflowed, before its square does."""
+RATE_MAX = 1e5  # fastest rate of a drive's linear part, 1/s: a time constant of 10 µs takes 1600 internal steps a ms
+STATE_MAX = 1e100  # largest magnitude of a drive's state; beyond, it counts as overflowed, before its square does
 
 _STEPS_MAX = 1_000_000  # largest number of internal steps in one step, which bounds its cost
 

@@ -17,8 +17,8 @@ from benchmarks.pictures import FOLDER as PICTURES
 from benchmarks.pictures import MAKERS, RECORD, digest
 from hybridsep import load_machine
 from hybridsep.cosim.fmu import read_description
+from hybridsep.fmi import FMI_VERSIONS
 from hybridsep.fmi.ssp import SSP_VERSIONS
-from hybridsep.fmi.variables import FMI_VERSIONS
 
 DATED = ROOT / "docs" / "experiments"
 """Pages that tell of the code at their commit: names of files on them may have gone."""

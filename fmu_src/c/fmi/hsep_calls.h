@@ -25,7 +25,7 @@ typedef struct {
     unsigned legal;
 } hsep_call;
 
-/* A row of a version's table of calls is a record, fmi2Reset_call; where it is, with v = fmi2 and function = Reset. */
+/* HSEP_CALL_ROW defines a row as fmi2Reset_call; HSEP_CALL(fmi2, Reset) is its address. */
 #define HSEP_CALL_ROW(function, legal) static const hsep_call function##_call = {#function, legal};
 #define HSEP_CALL(v, function) (&v##function##_call)
 
@@ -46,7 +46,8 @@ HSEP_API hsep_instance *hsep_call_instantiate(
 /* The instance if the call is legal now; otherwise NULL, and why not is logged. */
 HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call);
 
-/* Body of a function of a version: if the call is legal, do an action, which returns a hsep_status, on self. */
+/* Body of a function of a version: it declares call and self, does an action, which returns a hsep_status, on self if
+ * the call is legal, and returns. */
 #define HSEP_DO(v, function, handle, action) \
     const hsep_call *call = HSEP_CALL(v, function); \
     hsep_instance *self = hsep_begin(handle, call); \
@@ -55,7 +56,7 @@ HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call);
 /* Hand a message, formatted as printf does, to the importer's logger if its category is on. */
 HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, const char *format, ...);
 
-/* Log an error; HSEP_REFUSED. */
+/* Log an error; the value is HSEP_REFUSED. */
 #define hsep_refuse(instance, ...) (hsep_log(instance, HSEP_LOG_ERROR, __VA_ARGS__), (hsep_status)HSEP_REFUSED)
 
 /* What calls do once they are legal.
@@ -120,8 +121,9 @@ hsep_call_tune(const hsep_instance *instance, const hsep_call *call, unsigned re
 /* A value as a whole number of 32 bits. */
 HSEP_API int hsep_values_integer(double number);
 
-/* Begin of a function of a version, v, that gets or sets n variables: it returns if they may not be. */
-#define HSEP_ACCESS(v, function, handle, references, n, values, n_values) \
+/* Beginning of a function of a version, v, that gets or sets n variables: it declares call and self, and returns if
+ * they may not be. */
+#define HSEP_ACCESS_OR_RETURN(v, function, handle, references, n, values, n_values) \
     const hsep_call *call = HSEP_CALL(v, function); \
     hsep_instance *self = hsep_begin(handle, call); \
     if (self == NULL || hsep_call_access(self, call, references, n, values, n_values) != HSEP_OK) { \
@@ -131,7 +133,7 @@ HSEP_API int hsep_values_integer(double number);
 /* Bodies of these functions. get: the function's value of a double, number; set: the double of its value, number. What
  * is set has one value for each reference, as no array is an input or a parameter; if one is refused, none is set. */
 #define HSEP_GET(v, function, handle, references, n, to, n_values, get) \
-    HSEP_ACCESS(v, function, handle, references, n, to, n_values) \
+    HSEP_ACCESS_OR_RETURN(v, function, handle, references, n, to, n_values) \
     for (size_t i = 0; i < n; i++) { \
         size_t count = 0; \
         const double *source = hsep_values_source(self, references[i], &count); \
@@ -143,7 +145,7 @@ HSEP_API int hsep_values_integer(double number);
     return v##OK
 
 #define HSEP_SET(v, function, handle, references, n, from, n_values, type, set) \
-    HSEP_ACCESS(v, function, handle, references, n, from, n_values) \
+    HSEP_ACCESS_OR_RETURN(v, function, handle, references, n, from, n_values) \
     for (size_t i = 0; i < n; i++) { \
         const type number = from[i]; \
         if (hsep_call_tune(self, call, references[i], set) != HSEP_OK) { \

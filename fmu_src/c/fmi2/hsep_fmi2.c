@@ -201,21 +201,21 @@ static hsep_status fmi2_set_derivatives(
 fmi2Status fmi2SetRealInputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], const fmi2Real value[])
 {
-    const hsep_access access = {"fmi2SetRealInputDerivatives", "Real", vr, nvr, value, nvr};
+    const hsep_access access = {HSEP_CALL(fmi2, SetRealInputDerivatives)->name, "Real", vr, nvr, value, nvr};
     HSEP_DO(fmi2, SetRealInputDerivatives, c, fmi2_set_derivatives(self, &access, order, value));
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) { HSEP_DO(fmi2, CancelStep, c, HSEP_REFUSED); }
 
 /* Refuse a call for what modelDescription.xml says. */
-#define FMI2_ABSENT(function, why) \
+#define FMI2_ABSENT(function, c, why) \
     HSEP_DO(fmi2, function, c, hsep_refuse(self, "%s is not supported: %s in modelDescription.xml", call->name, why))
 
 fmi2Status fmi2GetRealOutputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], fmi2Real value[])
 {
     (void)vr, (void)nvr, (void)order, (void)value;
-    FMI2_ABSENT(GetRealOutputDerivatives, "maxOutputDerivativeOrder is 0");
+    FMI2_ABSENT(GetRealOutputDerivatives, c, "maxOutputDerivativeOrder is 0");
 }
 
 fmi2Status fmi2GetDirectionalDerivative(
@@ -223,7 +223,7 @@ fmi2Status fmi2GetDirectionalDerivative(
     size_t nKnown, const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 {
     (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
-    FMI2_ABSENT(GetDirectionalDerivative, "providesDirectionalDerivative is false");
+    FMI2_ABSENT(GetDirectionalDerivative, c, "providesDirectionalDerivative is false");
 }
 
 /* The functions that get a status: whether that one, s, is known, and its value. */

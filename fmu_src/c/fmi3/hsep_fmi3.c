@@ -212,7 +212,7 @@ FMI3_GET(UInt64, (fmi3UInt64)number)
 fmi3Status fmi3SetUInt64(
     fmi3Instance instance, const fmi3ValueReference references[], size_t n, const fmi3UInt64 values[], size_t n_values)
 {
-    HSEP_ACCESS(fmi3, SetUInt64, instance, references, n, values, n_values)
+    HSEP_ACCESS_OR_RETURN(fmi3, SetUInt64, instance, references, n, values, n_values)
     char message[HSEP_MESSAGE_SIZE] = "";
     for (size_t i = 0; i < n; i++) {
         if (hsep_call_tune(self, call, references[i], (double)values[i]) != HSEP_OK) {

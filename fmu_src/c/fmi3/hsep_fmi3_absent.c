@@ -9,6 +9,10 @@
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-parameter" /* they read nothing but the instance */
 #endif
+#ifdef _MSC_VER
+#pragma warning(push)
+#pragma warning(disable : 4100)
+#endif
 
 static fmi3Status fmi3_absent(fmi3Instance instance, const char *name, const char *why)
 {
@@ -77,8 +81,9 @@ FMI3_ABSENT(GetNominalsOfContinuousStates, fmi3_no_model_exchange, fmi3Instance 
 FMI3_ABSENT(GetNumberOfEventIndicators, fmi3_no_model_exchange, fmi3Instance instance, size_t *n)
 FMI3_ABSENT(GetNumberOfContinuousStates, fmi3_no_model_exchange, fmi3Instance instance, size_t *n)
 
-/* Another kind of FMU, with these parameters behind those of all kinds: there is no instance of it. */
-#define FMI3_NO_INSTANCE(kind, ...) \
+/* Another kind of FMU, with these parameters behind those of all kinds, logger one of them: there is no instance of it.
+ */
+#define FMI3_NO_INSTANCE(kind, logger, ...) \
     fmi3Instance fmi3Instantiate##kind( \
         fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath, fmi3Boolean visible, \
         fmi3Boolean loggingOn, fmi3InstanceEnvironment environment, __VA_ARGS__) \
@@ -89,11 +94,14 @@ FMI3_ABSENT(GetNumberOfContinuousStates, fmi3_no_model_exchange, fmi3Instance in
         } \
         return NULL; \
     }
-FMI3_NO_INSTANCE(ModelExchange, fmi3LogMessageCallback logger)
-FMI3_NO_INSTANCE(ScheduledExecution, fmi3LogMessageCallback logger, fmi3ClockUpdateCallback clockUpdate,
+FMI3_NO_INSTANCE(ModelExchange, logger, fmi3LogMessageCallback logger)
+FMI3_NO_INSTANCE(ScheduledExecution, logger, fmi3LogMessageCallback logger, fmi3ClockUpdateCallback clockUpdate,
     fmi3LockPreemptionCallback lockPreemption, fmi3UnlockPreemptionCallback unlockPreemption)
 /* clang-format on */
 
 #if defined(__GNUC__) || defined(__clang__)
 #pragma GCC diagnostic pop
+#endif
+#ifdef _MSC_VER
+#pragma warning(pop)
 #endif

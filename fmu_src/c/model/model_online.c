@@ -205,8 +205,10 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
 
 #endif
 
-/* Inputs, which are latched at the instants within a communication step, and executed in the step that reaches the next
- * instant --------------------------------------------------------------------------------------------------------- */
+/* Inputs ----------------------------------------------------------------------------------------------------------- */
+
+/* They are latched at the instants within a communication step, and executed in the step that reaches the next instant.
+ */
 
 /* A step in progress. */
 typedef struct {
@@ -215,16 +217,17 @@ typedef struct {
     int pending;                   /* whether the inputs of the next sample are latched */
 } online_step;
 
-/* An input, by its place, at an instant, s after the step's start; the importer may have set its time derivative. */
+/* Input at place, m, `after` s into the step; the importer may have set its time derivative. */
 static double online_at(const hsep_context *context, const double values[], size_t place, double after)
 {
     const double slope = values[context->n_variables + place];
     return slope == 0.0 ? values[place] : values[place] + slope * after;
 }
 
-/* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. may_miss: whether x_meas may be
- * NaN, which is missing. Fails if one of them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant
- * is no communication point; HSEP_WARNED_MOVED: one was taken at a point beside it; or both. */
+/* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. Usage: online_count, then
+ * execute a sample while online_next returns 1. may_miss: whether x_meas may be NaN, which is missing. Fails if one of
+ * them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant is no communication point;
+ * HSEP_WARNED_MOVED: one was taken at a point beside it; or both. */
 static hsep_status online_count(
     const hsep_context *context, const online_inputs *self, const double values[], int may_miss, double t, double h,
     online_step *step, char message[])

@@ -72,7 +72,8 @@ HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, d
     return 1;
 }
 
-HSEP_API double hsep_stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings)
+/* Set what follows from the parameters; return the bytes of the block. */
+static double stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings)
 {
     double end = HSEP_WORDS(hsep_stage);
     self->settings = *settings;
@@ -88,6 +89,14 @@ HSEP_API double hsep_stage_lay_out(hsep_stage *self, uint64_t n_modes, const hse
     return end * sizeof(double);
 }
 
+HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings)
+{
+    return stage_lay_out(&(hsep_stage){0}, n_modes, settings);
+}
+
+/* Work space of a step, (8 n_modes,), zeros between steps. */
+static inline double *stage_work(hsep_stage *self) { return hsep_at(self, self->line) + self->n_line; }
+
 static const hsep_stage_mode *stage_modes(const hsep_stage *self)
 {
     return (const hsep_stage_mode *)hsep_at_const(self, self->modes);
@@ -97,8 +106,8 @@ HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,
     double start)
 {
-    memset(self, 0, (size_t)hsep_stage_lay_out(self, n_modes, settings));
-    (void)hsep_stage_lay_out(self, n_modes, settings);
+    memset(self, 0, (size_t)hsep_stage_size(n_modes, settings));
+    (void)stage_lay_out(self, n_modes, settings);
     (void)hsep_clock_init(&self->clock, 0.0, T_s);
     self->start = start;
     hsep_stage_mode *stage = (hsep_stage_mode *)hsep_at(self, self->modes);
@@ -231,7 +240,7 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h)
     double acting = foh || late ? self->acting : r;
     double last_x_d = self->last_x_d, v_d = self->v_d, v = self->v, done = 0.0;
     const size_t z_size = (size_t)(2 * self->n_modes) * sizeof(double);
-    double *line = hsep_at(self, self->line), *z = line + self->n_line, *slope = z + 2 * self->n_modes;
+    double *line = hsep_at(self, self->line), *z = stage_work(self), *slope = z + 2 * self->n_modes;
     hsep_clock_step step;
     (void)hsep_clock_count(&self->clock, self->clock.end, h, &step);
     memcpy(z, hsep_at(self, self->z), z_size);

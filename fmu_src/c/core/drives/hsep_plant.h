@@ -59,7 +59,7 @@ typedef struct {
 /* x = G_pb (x_d - d) with d = f tanh(v_f / v_friction) + kappa x|x|; v_f is the velocity of the friction. Without a
  * dead time and held, a command acts at once; else it is sampled at the instants. A first-order hold with a dead time
  * goes from the last command to this one, which takes one sample of the dead time; without a dead time it goes on with
- * the last slope. A block as hsep_layout.h has them. */
+ * the last slope. Laid out as in hsep_layout.h. */
 typedef struct {
     hsep_stage_settings settings;
     double friction_gain; /* m/s, velocity that the whole friction takes away at once, f sum beta */
@@ -73,7 +73,7 @@ typedef struct {
     /* Offsets in doubles from the beginning of the struct */
     uint64_t modes; /* hsep_stage_mode[n_modes] */
     uint64_t z;     /* (2 n_modes,) z and z' of each, m s^2 and m s */
-    uint64_t line;  /* (n_line,) m from start; then work space of a step, (8 n_modes,), zeros between steps */
+    uint64_t line;  /* (n_line,) m from start; behind it lies the work space of a step */
 } hsep_stage;
 
 HSEP_ASSERT_WORDS(hsep_feed_drive, 9);
@@ -81,9 +81,10 @@ HSEP_ASSERT_WORDS(hsep_stage_mode, 4);
 HSEP_ASSERT_WORDS(hsep_stage_settings, 6);
 HSEP_ASSERT_WORDS(hsep_stage, 23);
 
-HSEP_API double hsep_stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings);
+/* Bytes of the block. */
+HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings);
 
-/* Reset the stage to rest at start, m. modes: (n_modes,). */
+/* Reset the stage to rest at start, m. modes: (n_modes,), settings: neither of them in the block. */
 HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,
     double start);

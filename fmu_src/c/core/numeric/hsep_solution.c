@@ -65,7 +65,8 @@ static void solution_add(hsep_solution *self, const hsep_gram *gram, hsep_real w
             *to += weight * row[n_head - i - 1 - j];
             to += n_head + n_tail - j;
         }
-        *to += weight * row[n - n_tail - i]; /* a step from the diagonal: the row's target */
+        /* one step below the diagonal of the next column, stored as the row's last entry, its target */
+        *to += weight * row[n - n_tail - i];
         row += n - n_tail + 1 - i;
     }
     const hsep_real square = hsep_at_const(gram, gram->sums)[(hsep_int)hsep_triangle(n + 1) - 1];
