@@ -4,7 +4,8 @@
  * delta. Each of at most three Gauss-Newton steps solves the quadratic programme of the linearised model, and goes
  * towards its minimum as far as lowers the cost. Once it has learned, the averaged model judges all plans: its own, the
  * physics model's, and the remainder of the last one; the best is taken. Where its own asks for a larger change than
- * compensation is made for, it is wrong, and plans none for a time, which doubles.
+ * compensation is made for, it is wrong, and plans none for a time, which doubles; a plan that ends compensation stands
+ * for the remainder then, and is followed where compensation is off.
  *
  * A plan is one function in reading order, cut by yields into short parts, each of which says what it costs;
  * hsep_averaged_planner_run does as many as a sample's equal share of the work that may be left. A block as
@@ -103,9 +104,10 @@ HSEP_API void hsep_averaged_planner_begin(
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
  * Cost: of a plan at most, with n splines that are not pinned and all = preview + late samples, m^2 / 2 multiply-adds
  * for each expert with m features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 3 steps
- * of the physics model's programme, or 5 without what follows; 3 Newton steps of n preview p / 2 for each expert, n^2
- * preview / 4, 2 predictions, and 5 steps of their programmes. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview,
- * a prediction all (m + 60) for each expert, and 700 all. */
+ * of the physics model's programme, and 3 Newton steps of n preview p / 2 for each expert, n^2 preview / 4, 2
+ * predictions, and 5 steps of their programmes; or 5 steps of the first, and of the programme of a plan that ends
+ * compensation. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all (m + 60) for each expert, and
+ * 700 all. */
 HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples);
 
 #endif
