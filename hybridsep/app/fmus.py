@@ -9,7 +9,7 @@ import typer
 
 from ..base.errors import ParameterError
 from ..base.files import DEFAULT_MACHINE
-from ..fmi import FLAVOURS, FMI_VERSIONS
+from ..fmi.flavours import FLAVOURS, FMI_VERSIONS
 from . import options
 
 if TYPE_CHECKING:

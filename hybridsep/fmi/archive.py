@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 from ..base.errors import FmuError
 from ..base.files import atomic_open
 from ..machines.machine import Machine
-from . import FLAVOURS, FMI_VERSIONS, native, python
+from . import native, python
 from .compile import ALL_TARGETS, default_targets, expanded
+from .flavours import FLAVOURS, FMI_VERSIONS
 from .spec import FmuSpec, fmu_name, fmu_names
 from .weights import saved_weights
 

@@ -29,8 +29,8 @@ from tempfile import TemporaryDirectory
 
 from ..base.errors import FmuError
 from ..base.files import atomic_open, data_folder, named_errors
-from . import FMI_VERSIONS
 from .c_header import KINDS, c_sources, fmi_headers, kind_header
+from .flavours import FMI_VERSIONS
 
 ZIG = "ziglang 0.17.1"  # the compiler of the libraries in the wheel, which pyproject.toml pins as a build requirement
 

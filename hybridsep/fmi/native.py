@@ -17,7 +17,6 @@ from ..base.files import data_folder
 from ..base.signals import Array
 from ..base.version import __version__
 from ..plants.trajectory import spiral, staircase
-from . import FMI_VERSIONS
 from .c_header import FMI_HEADERS, TABLE_FILE, c_header, c_sources, fmi_headers, table_file
 from .compile import default_targets, libraries, placed
 from .description import (
@@ -31,6 +30,7 @@ from .description import (
     model_description,
     terminals_and_icons,
 )
+from .flavours import FMI_VERSIONS
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
 from .weights import WEIGHTS_FILE

@@ -18,7 +18,7 @@ from ..machines.machine import PAPER_SETTINGS, Machine
 from ..machines.sections import FeedDriveSection, IdentifiedSection
 from ..model.physics import ModalModel
 from ..plants.trajectory import staircase
-from . import FLAVOURS, FMI_VERSIONS
+from .flavours import FLAVOURS, FMI_VERSIONS
 from .variables import SAMPLES_TRAJECTORY, FmuTable
 
 AUTHOR = "the hybridsep authors"

@@ -17,9 +17,10 @@ from ..base.files import atomic_open
 from ..base.signals import as_samples
 from ..base.version import __version__
 from ..machines.machine import Machine
-from . import FMI_VERSIONS, native
+from . import native
 from .archive import archived
 from .description import described_variables, document, unit_elements
+from .flavours import FMI_VERSIONS
 from .spec import FmuSpec
 from .variables import Variable
 from .weights import saved_weights

@@ -17,7 +17,7 @@ from benchmarks.pictures import FOLDER as PICTURES
 from benchmarks.pictures import MAKERS, RECORD, digest
 from hybridsep import load_machine
 from hybridsep.cosim.fmu import read_description
-from hybridsep.fmi import FMI_VERSIONS
+from hybridsep.fmi.flavours import FMI_VERSIONS
 from hybridsep.fmi.ssp import SSP_VERSIONS
 
 DATED = ROOT / "docs" / "experiments"

@@ -13,7 +13,7 @@ import pytest
 from c_compiler import build_folder
 
 from hybridsep import build_fmu, fmu_names, load_machine, machine_names
-from hybridsep.fmi import FLAVOURS
+from hybridsep.fmi.flavours import FLAVOURS
 from hybridsep.machines.machine import Machine
 
 _FMUS = {
