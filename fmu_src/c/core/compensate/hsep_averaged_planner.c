@@ -3,7 +3,6 @@
 #include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include <stddef.h>
 #include <string.h>
 
 static const hsep_real averaged_planner_reaches[] = {HSEP_NEWTON_REACHES};

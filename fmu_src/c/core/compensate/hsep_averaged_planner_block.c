@@ -4,7 +4,6 @@
 #include "hsep_cholesky.h"
 #include "hsep_math.h"
 
-#include <stddef.h>
 #include <string.h>
 
 HSEP_API hsep_real hsep_averaged_planner_lay_out(

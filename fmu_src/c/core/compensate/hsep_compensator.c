@@ -2,7 +2,6 @@
 
 #include "hsep_math.h"
 
-#include <stddef.h>
 #include <string.h>
 
 static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};

@@ -28,7 +28,6 @@
 #include "hsep_layout.h"
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
-#include "hsep_real.h"
 #include "hsep_averaged_planner.h"
 
 typedef struct {

@@ -4,7 +4,6 @@
 #include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include <stddef.h>
 #include <string.h>
 
 /* Slacks and multipliers of the bounds B x >= b, those of the low rows, then those of the high ones, as qp.py has them:

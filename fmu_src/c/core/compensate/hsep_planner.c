@@ -4,7 +4,6 @@
 #include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include <stddef.h>
 #include <string.h>
 
 static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }

@@ -11,10 +11,8 @@
 #ifndef HSEP_PLANNER_H
 #define HSEP_PLANNER_H
 
-#include "hsep_api.h"
 #include "hsep_interior.h"
 #include "hsep_layout.h"
-#include "hsep_real.h"
 #include "hsep_splines.h"
 #include "hsep_stop.h"
 

@@ -10,10 +10,8 @@
 #ifndef HSEP_SPLINES_H
 #define HSEP_SPLINES_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_plan_constants.h"
-#include "hsep_real.h"
 #include "hsep_vector.h"
 
 #define HSEP_ORDERS 4                          /* orders of difference: 0, the change itself, to 3, its jerk */

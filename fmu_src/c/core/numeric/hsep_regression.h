@@ -13,7 +13,6 @@
 #ifndef HSEP_REGRESSION_H
 #define HSEP_REGRESSION_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
 
 typedef struct {

@@ -3,7 +3,6 @@
 #include "hsep_cholesky.h"
 
 #include <float.h>
-#include <stddef.h>
 #include <string.h>
 
 #ifdef HSEP_FLOAT32

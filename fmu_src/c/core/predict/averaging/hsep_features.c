@@ -2,7 +2,6 @@
 
 #include "hsep_math.h"
 
-#include <stddef.h>
 #include <string.h>
 
 #define DISTURBANCES_TOGETHER 64 /* samples that are filtered in one go */

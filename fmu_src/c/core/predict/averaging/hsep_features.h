@@ -9,11 +9,9 @@
 #ifndef HSEP_FEATURES_H
 #define HSEP_FEATURES_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
 #include "hsep_predict_constants.h"
-#include "hsep_real.h"
 #include "hsep_window.h"
 
 #define HSEP_DISTURBANCES_OF_COMMAND (HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS)
