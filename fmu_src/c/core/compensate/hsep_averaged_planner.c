@@ -490,7 +490,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
                 averaged_planner_products(self, task);
             }
             AVERAGED_PLANNER_YIELD(10, work.factor);
-            hsep_planner_complete(planner, self->n_pinned);
+            hsep_planner_complete(planner, self->n_pinned, planner->jerk_weight);
             if (!hsep_planner_factor(planner, 1)) {
                 break;
             }

@@ -23,11 +23,10 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_c
     self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
     self->planner = hsep_take_block(&end, hsep_planner_lay_out(&(hsep_planner){0}, &parameters->planner));
     self->predictor = hsep_take_block(&end, hsep_predictor_lay_out(&(hsep_predictor){0}, predictor));
-    self->averaged =
-        predictor->averaging.averaging
-            ? hsep_take_block(
-                  &end, hsep_averaged_planner_lay_out(&(hsep_averaged_planner){0}, &model, &parameters->planner))
-            : 0;
+    if (predictor->averaging.averaging) {
+        self->averaged = hsep_take_block(
+            &end, hsep_averaged_planner_lay_out(&(hsep_averaged_planner){0}, &model, &parameters->planner));
+    }
     return end * sizeof(hsep_real);
 }
 
@@ -133,7 +132,9 @@ static const hsep_real *compensator_filter_spline(hsep_compensator *self)
     return x;
 }
 
-HSEP_API int hsep_has_stable_poles(const hsep_recursion *recursion, hsep_real work[])
+/* Whether all roots of z^p - w_e,1 z^(p-1) - ... - w_e,p are inside the unit circle: the Schur-Cohn test by step-down
+ * recursion (Jury 1964). work: (2 p,). Cost: p^2 / 2 multiply-adds and p divisions. */
+static int compensator_has_stable_poles(const hsep_recursion *recursion, hsep_real work[])
 {
     const hsep_int p = recursion->p;
     hsep_real *a = work, *next = work + p;
@@ -245,7 +246,8 @@ static int compensator_plan(hsep_compensator *self)
     hsep_plan_status status = HSEP_PLAN_FAILED;
     self->state = HSEP_SEP_OFF;
     if (self->compensate == HSEP_SEP_HYBRID && (hsep_real)predictor->k >= predictor->n_init &&
-        hsep_paper_regression(paper)->n_rows > 0.0 && hsep_has_stable_poles(&recursion, hsep_at(self, self->trial_e))) {
+        hsep_paper_regression(paper)->n_rows > 0.0 &&
+        compensator_has_stable_poles(&recursion, hsep_at(self, self->trial_e))) {
         status = compensator_try(self, HSEP_SEP_HYBRID);
     }
     if (status == HSEP_PLAN_FAILED && self->compensate != HSEP_SEP_OFF) {

@@ -14,16 +14,6 @@
 /* Parts in which the averaged model predicts a window behind its first sample, as variances are dear. */
 static const hsep_int residual_parts = 25;
 
-HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self)
-{
-    return self->paper ? (hsep_paper *)hsep_at(self, self->paper) : NULL;
-}
-
-HSEP_API hsep_averaged *hsep_residual_averaged(hsep_residual_model *self)
-{
-    return self->averaged ? (hsep_averaged *)hsep_at(self, self->averaged) : NULL;
-}
-
 HSEP_API hsep_real hsep_residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
 {
     hsep_real end = HSEP_WORDS(hsep_residual_model);
@@ -31,12 +21,11 @@ HSEP_API hsep_real hsep_residual_lay_out(hsep_residual_model *self, const hsep_r
     self->late = hsep_late(parameters->settings);
     self->n = self->Np + self->late;
     self->planned = parameters->planned != 0;
-    self->paper = parameters->averaging->averaging
-                      ? 0
-                      : hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, parameters->settings));
-    self->averaged = parameters->averaging->averaging
-                         ? hsep_take_block(&end, hsep_averaged_lay_out(&(hsep_averaged){0}, parameters))
-                         : 0;
+    if (parameters->averaging->averaging) {
+        self->averaged = hsep_take_block(&end, hsep_averaged_lay_out(&(hsep_averaged){0}, parameters));
+    } else {
+        self->paper = hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, parameters->settings));
+    }
     return end * sizeof(hsep_real);
 }
 

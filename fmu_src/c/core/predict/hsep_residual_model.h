@@ -27,8 +27,14 @@ HSEP_API void hsep_residual_init(
     hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start);
 
 /* The implementation; NULL if it is the other one. */
-HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self);
-HSEP_API hsep_averaged *hsep_residual_averaged(hsep_residual_model *self);
+static inline hsep_paper *hsep_residual_paper(hsep_residual_model *self)
+{
+    return self->paper ? (hsep_paper *)hsep_at(self, self->paper) : NULL;
+}
+static inline hsep_averaged *hsep_residual_averaged(hsep_residual_model *self)
+{
+    return self->averaged ? (hsep_averaged *)hsep_at(self, self->averaged) : NULL;
+}
 
 /* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of
  * one of them. The first one has the rows of the physics model's residual. */
