@@ -97,7 +97,7 @@ static void planner_total(hsep_planner *self, const hsep_real x_d[])
 /* Bounds of a row, in shares. Where x_d itself exceeds a limit within the length of a spline, as a command that is held
  * or rounded does, what it takes is added to the limit. The remainder of the last plan is always feasible, with a small
  * margin: an interior-point method needs an interior. */
-static void planner_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most)
+static inline void planner_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most)
 {
     const hsep_int preview = hsep_planner_splines(self)->preview;
     const hsep_real total = hsep_at_const(self, self->total)[r];
