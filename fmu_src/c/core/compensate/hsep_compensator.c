@@ -30,6 +30,15 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_c
     return end * sizeof(hsep_real);
 }
 
+/* The physics model as it is now, for a trial. */
+static hsep_physics *compensator_trial(hsep_compensator *self)
+{
+    const hsep_predictor *predictor = hsep_compensator_predictor(self);
+    return memcpy(
+        hsep_at(self, self->trial), hsep_at_const(predictor, predictor->physics),
+        (size_t)(self->planner - self->trial) * sizeof(hsep_real));
+}
+
 HSEP_API void hsep_compensator_block_init(
     hsep_compensator *self, const hsep_compensator_parameters *parameters, hsep_real start)
 {
@@ -43,15 +52,10 @@ HSEP_API void hsep_compensator_block_init(
     self->error_max = parameters->error_max;
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
     /* The spline filtered by the physics model from rest, which is constant. */
-    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
+    hsep_physics *trial = compensator_trial(self);
     hsep_real *spline = hsep_at(self, self->spline_pb);
-    const hsep_int width = 4 * parameters->planner.spacing;
-    hsep_physics_init(
-        trial, predictor->modes, predictor->n_modes, predictor->settings.dead_time, predictor->settings.T_s,
-        (hsep_hold)predictor->settings.input_hold);
-    memcpy(
-        spline, hsep_splines_shape(hsep_planner_splines(hsep_compensator_planner(self))),
-        (size_t)width * sizeof(hsep_real));
+    const hsep_splines *splines = hsep_planner_splines(hsep_compensator_planner(self));
+    memcpy(spline, hsep_splines_shape(splines), (size_t)(4 * splines->spacing) * sizeof(hsep_real));
     hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->horizon);
     if (self->averaged) {
         const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
@@ -92,8 +96,7 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
     const hsep_real *load = hsep_at(self, self->load);
     hsep_real *target = hsep_at(self, self->target);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
-    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
-    memcpy(trial, hsep_predictor_physics(predictor), (size_t)(self->planner - self->trial) * sizeof(hsep_real));
+    hsep_physics *trial = compensator_trial(self);
     for (hsep_int k = 0; k < horizon; k++) {
         const hsep_real decided = hsep_splines_sum(hsep_planner_splines(planner), c, HSEP_N_DECIDED, k);
         const hsep_real command = x_d[k] - predictor->start + decided + load[k];

@@ -63,11 +63,6 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
     }
 }
 
-HSEP_API hsep_int hsep_planner_pinned(const hsep_planner *self)
-{
-    return self->n_pinned * hsep_planner_splines(self)->spacing;
-}
-
 /* The drive's limits are linear constraints on the rows of a plan (hsep_splines.h), in shares of a limit. */
 
 /* Rows of x_dm, of delta in order 0, under the remainder of the last plan, in shares; and the direction of x_d. */
@@ -179,11 +174,6 @@ HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_re
         bounded += hsep_fabs(delta) * splines->share[0] > HSEP_PLANNING_AT_BOUND;
     }
     return bounded / (hsep_real)self->Np;
-}
-
-HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first)
-{
-    return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
 }
 
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self)

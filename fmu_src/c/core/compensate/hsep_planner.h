@@ -78,7 +78,10 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
 
 /* Samples that a bounded plan leaves as they are: the time to solve it in. */
-HSEP_API hsep_int hsep_planner_pinned(const hsep_planner *self);
+static inline hsep_int hsep_planner_pinned(const hsep_planner *self)
+{
+    return self->n_pinned * hsep_planner_splines(self)->spacing;
+}
 
 /* Begin plans of a window. x_d: commanded positions, m, (preview,). */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
@@ -110,7 +113,10 @@ HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
 /* The cost 1/2 c' P c - v' c of the splines first ... n - 1, for a caller that sets it itself: the triangle P of n -
  * first rows, and v, (n - first,), m; hsep_planner_complete adds the jerk's, times a weight, and makes P positive
  * definite. */
-HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first);
+static inline hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first)
+{
+    return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
+}
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first, hsep_real jerk_weight);
 

@@ -5,8 +5,6 @@
 
 #include <string.h>
 
-HSEP_API const hsep_real *hsep_splines_shape(const hsep_splines *self) { return hsep_at_const(self, self->shape); }
-
 /* The differences of an order of one spline, in shares, (4 spacing + order,); the first one is 0. */
 static const hsep_real *splines_differences(const hsep_splines *self, unsigned order)
 {
@@ -14,11 +12,6 @@ static const hsep_real *splines_differences(const hsep_splines *self, unsigned o
 }
 
 static hsep_int splines_length(const hsep_splines *self, unsigned order) { return 4 * self->spacing + order; }
-
-HSEP_API hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing)
-{
-    return (preview - 4 * spacing - HSEP_SPLINES_END) / spacing + 1;
-}
 
 HSEP_API hsep_real hsep_splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int spacing)
 {

@@ -45,11 +45,6 @@ static hsep_gram *residual_gram(hsep_residual_model *self, hsep_int factor)
     return hsep_warm_start_of_run(hsep_averaged_evidence(hsep_residual_averaged(self), factor));
 }
 
-HSEP_API hsep_int hsep_residual_n_factors(const hsep_residual_model *self)
-{
-    return self->averaged ? HSEP_N_RESIDUALS : 1;
-}
-
 HSEP_API hsep_int hsep_residual_n_features(hsep_residual_model *self, hsep_int factor)
 {
     return self->averaged ? residual_gram(self, factor)->n : hsep_paper_regression(hsep_residual_paper(self))->n;
@@ -154,12 +149,6 @@ HSEP_API void hsep_residual_predict(
     }
 }
 
-HSEP_API const hsep_real *hsep_residual_variance(hsep_residual_model *self)
-{
-    hsep_averaged *averaged = hsep_residual_averaged(self);
-    return averaged != NULL ? hsep_at(averaged, averaged->variance) + (averaged->n - self->n) : NULL;
-}
-
 HSEP_API void hsep_residual_take_in(
     hsep_residual_model *self, const hsep_residual_window *window, const hsep_residual_sample *sample)
 {
@@ -185,15 +174,4 @@ HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual
             self->learning != 0);
     }
     return self->learning != 0;
-}
-
-HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self)
-{
-    hsep_averaged *averaged = hsep_residual_averaged(self);
-    return averaged != NULL ? hsep_at(averaged, averaged->accepted) : NULL;
-}
-
-HSEP_API hsep_int hsep_residual_n_rejected(const hsep_residual_model *self)
-{
-    return self->averaged ? ((const hsep_averaged *)hsep_at_const(self, self->averaged))->n_rejected : 0;
 }

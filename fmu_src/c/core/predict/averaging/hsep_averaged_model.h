@@ -117,10 +117,16 @@ static inline hsep_expert *hsep_averaged_expert(hsep_averaged *self, hsep_int ex
 }
 
 /* HSEP_COMMAND_RESIDUAL if an expert predicts the residual of the command, else HSEP_MODEL_RESIDUAL. */
-HSEP_API hsep_int hsep_averaged_kind_of(const hsep_averaged *self, hsep_int expert);
+static inline hsep_int hsep_averaged_kind_of(const hsep_averaged *self, hsep_int expert)
+{
+    return hsep_expert_of(hsep_expert_of(expert).is_fresh ? self->leading : expert).target;
+}
 
 /* Whether this run doubts earlier ones. */
-HSEP_API int hsep_averaged_doubts(hsep_averaged *self);
+static inline int hsep_averaged_doubts(hsep_averaged *self)
+{
+    return hsep_warm_start_earlier(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL))->n_rows > 0.0;
+}
 
 /* The solution of an expert; NULL where no rows train it. */
 HSEP_API hsep_solution *hsep_averaged_solution(hsep_averaged *self, hsep_int expert);
