@@ -14,12 +14,10 @@
 #ifndef HSEP_AVERAGED_PLANNER_H
 #define HSEP_AVERAGED_PLANNER_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_linearised.h"
 #include "hsep_physics.h"
 #include "hsep_planner.h"
-#include "hsep_real.h"
 #include "hsep_averaged_model.h"
 
 #define HSEP_AVERAGED_STEPS 3    /* Newton steps of a plan at most, */

@@ -2,7 +2,6 @@
 
 #include "hsep_math.h"
 
-#include <stddef.h>
 #include <string.h>
 
 static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};
@@ -24,12 +23,20 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_c
     self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
     self->planner = hsep_take_block(&end, hsep_planner_lay_out(&(hsep_planner){0}, &parameters->planner));
     self->predictor = hsep_take_block(&end, hsep_predictor_lay_out(&(hsep_predictor){0}, predictor));
-    self->averaged =
-        predictor->averaging.averaging
-            ? hsep_take_block(
-                  &end, hsep_averaged_planner_lay_out(&(hsep_averaged_planner){0}, &model, &parameters->planner))
-            : 0;
+    if (predictor->averaging.averaging) {
+        self->averaged = hsep_take_block(
+            &end, hsep_averaged_planner_lay_out(&(hsep_averaged_planner){0}, &model, &parameters->planner));
+    }
     return end * sizeof(hsep_real);
+}
+
+/* The physics model as it is now, for a trial. */
+static hsep_physics *compensator_trial(hsep_compensator *self)
+{
+    const hsep_predictor *predictor = hsep_compensator_predictor(self);
+    return memcpy(
+        hsep_at(self, self->trial), hsep_at_const(predictor, predictor->physics),
+        (size_t)(self->planner - self->trial) * sizeof(hsep_real));
 }
 
 HSEP_API void hsep_compensator_block_init(
@@ -45,15 +52,10 @@ HSEP_API void hsep_compensator_block_init(
     self->error_max = parameters->error_max;
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
     /* The spline filtered by the physics model from rest, which is constant. */
-    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
+    hsep_physics *trial = compensator_trial(self);
     hsep_real *spline = hsep_at(self, self->spline_pb);
-    const hsep_int width = 4 * parameters->planner.spacing;
-    hsep_physics_init(
-        trial, predictor->modes, predictor->n_modes, predictor->settings.dead_time, predictor->settings.T_s,
-        (hsep_hold)predictor->settings.input_hold);
-    memcpy(
-        spline, hsep_splines_shape(hsep_planner_splines(hsep_compensator_planner(self))),
-        (size_t)width * sizeof(hsep_real));
+    const hsep_splines *splines = hsep_planner_splines(hsep_compensator_planner(self));
+    memcpy(spline, hsep_splines_shape(splines), (size_t)(4 * splines->spacing) * sizeof(hsep_real));
     hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->horizon);
     if (self->averaged) {
         const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
@@ -94,8 +96,7 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
     const hsep_real *load = hsep_at(self, self->load);
     hsep_real *target = hsep_at(self, self->target);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
-    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
-    memcpy(trial, hsep_predictor_physics(predictor), (size_t)(self->planner - self->trial) * sizeof(hsep_real));
+    hsep_physics *trial = compensator_trial(self);
     for (hsep_int k = 0; k < horizon; k++) {
         const hsep_real decided = hsep_splines_sum(hsep_planner_splines(planner), c, HSEP_N_DECIDED, k);
         const hsep_real command = x_d[k] - predictor->start + decided + load[k];
@@ -134,7 +135,9 @@ static const hsep_real *compensator_filter_spline(hsep_compensator *self)
     return x;
 }
 
-HSEP_API int hsep_has_stable_poles(const hsep_recursion *recursion, hsep_real work[])
+/* Whether all roots of z^p - w_e,1 z^(p-1) - ... - w_e,p are inside the unit circle: the Schur-Cohn test by step-down
+ * recursion (Jury 1964). work: (2 p,). Cost: p^2 / 2 multiply-adds and p divisions. */
+static int compensator_has_stable_poles(const hsep_recursion *recursion, hsep_real work[])
 {
     const hsep_int p = recursion->p;
     hsep_real *a = work, *next = work + p;
@@ -246,7 +249,8 @@ static int compensator_plan(hsep_compensator *self)
     hsep_plan_status status = HSEP_PLAN_FAILED;
     self->state = HSEP_SEP_OFF;
     if (self->compensate == HSEP_SEP_HYBRID && (hsep_real)predictor->k >= predictor->n_init &&
-        hsep_paper_regression(paper)->n_rows > 0.0 && hsep_has_stable_poles(&recursion, hsep_at(self, self->trial_e))) {
+        hsep_paper_regression(paper)->n_rows > 0.0 &&
+        compensator_has_stable_poles(&recursion, hsep_at(self, self->trial_e))) {
         status = compensator_try(self, HSEP_SEP_HYBRID);
     }
     if (status == HSEP_PLAN_FAILED && self->compensate != HSEP_SEP_OFF) {

@@ -28,7 +28,6 @@
 #include "hsep_layout.h"
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
-#include "hsep_real.h"
 #include "hsep_averaged_planner.h"
 
 typedef struct {
@@ -94,9 +93,5 @@ static inline hsep_averaged_planner *hsep_compensator_averaged(hsep_compensator 
 
 /* Plan the first window. */
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);
-
-/* Whether all roots of z^p - w_e,1 z^(p-1) - ... - w_e,p are inside the unit circle: the Schur-Cohn test by step-down
- * recursion (Jury 1964). work: (2 p,). Cost: p^2 / 2 multiply-adds and p divisions. */
-HSEP_API int hsep_has_stable_poles(const hsep_recursion *recursion, hsep_real work[]);
 
 #endif

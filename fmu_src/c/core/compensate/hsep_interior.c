@@ -4,7 +4,6 @@
 #include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include <stddef.h>
 #include <string.h>
 
 /* Slacks and multipliers of the bounds B x >= b, those of the low rows, then those of the high ones, as qp.py has them:
@@ -113,8 +112,7 @@ static slacks_step_lengths slacks_lengths(const slacks *self)
 }
 
 /* Return mu, the mean of s z, with B x in ds; *primal: the largest primal residual; *beyond: by how much the worst
- * bound is exceeded, negative inside all of them. The predictor's r_c is set, as if s z = 0 could be reached at once.
- */
+ * bound is exceeded, negative inside all of them. Set the predictor's r_c, as if s z = 0 could be reached at once. */
 static hsep_real slacks_take_residuals(const slacks *self, hsep_real *primal, hsep_real *beyond)
 {
     const slacks it = *self;
@@ -171,7 +169,8 @@ static hsep_real slacks_move(const slacks *self)
 
 /* The arrays behind the struct. */
 typedef struct {
-    hsep_int n;          /* entries of x */
+    const hsep_splines *splines;
+    hsep_int first, n;   /* the first spline that is not fixed; entries of x */
     hsep_real *x, *v;    /* (n,) iterate and linear term */
     hsep_real *inner;    /* (n,) iterate that is farthest inside the bounds */
     hsep_real *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
@@ -217,7 +216,9 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
 {
     interior_arrays a;
     (void)interior_lay_out((hsep_real *)self, splines->preview, splines->n, &a);
-    a.n = splines->n - self->first;
+    a.splines = splines;
+    a.first = self->first;
+    a.n = splines->n - a.first;
     a.slacks.rho = self->rho;
     a.slacks.n = 0;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
@@ -230,9 +231,9 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
 }
 
 /* B of x or dx, (n,), to ds. */
-static void interior_rows(const interior_arrays *a, const hsep_splines *splines, hsep_int first, const hsep_real x[])
+static void interior_rows(const interior_arrays *a, const hsep_real x[])
 {
-    hsep_splines_rows(splines, x, first, a->slacks.rows);
+    hsep_splines_rows(a->splines, x, a->first, a->slacks.rows);
     slacks_take_rows(&a->slacks, a->slacks.rows, a->slacks.rows, a->slacks.ds);
 }
 
@@ -266,14 +267,12 @@ HSEP_API void hsep_interior_begin(
     }
     a.slacks.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
     slacks_take_rows(&a.slacks, a.slacks.rows, a.slacks.work, a.slacks.b);
-    interior_rows(&a, splines, first, a.x);
+    interior_rows(&a, a.x);
     slacks_begin(&a.slacks, self->cost);
 }
 
-/* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its
- * terms. */
-static hsep_real interior_dual_residual(
-    const interior_arrays *a, const hsep_splines *splines, hsep_int first, const hsep_real *P)
+/* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its terms. */
+static hsep_real interior_dual_residual(const interior_arrays *a, const hsep_real *P)
 {
     hsep_real residual = 0.0, largest = 0.0;
     memcpy(a->r_d, a->v, (size_t)a->n * sizeof(hsep_real));
@@ -285,7 +284,7 @@ static hsep_real interior_dual_residual(
     }
     memset(a->dx, 0, (size_t)a->n * sizeof(hsep_real));
     slacks_give_rows(&a->slacks, a->slacks.z, -1.0);
-    hsep_splines_transpose(splines, a->slacks.rows, first, a->dx);
+    hsep_splines_transpose(a->splines, a->slacks.rows, a->first, a->dx);
     for (hsep_int j = 0; j < a->n; j++) {
         largest = hsep_fmax(
             hsep_fmax(largest, hsep_fabs(a->v[j])), hsep_fmax(hsep_fabs(a->v[j] - a->r_d[j]), hsep_fabs(a->dx[j])));
@@ -296,27 +295,26 @@ static hsep_real interior_dual_residual(
 }
 
 /* dx := (P + A' W A)^-1 (r_d + B' push), and B dx. */
-static void interior_direction(const interior_arrays *a, const hsep_splines *splines, hsep_int first)
+static void interior_direction(const interior_arrays *a)
 {
     slacks_push(&a->slacks);
     memcpy(a->dx, a->r_d, (size_t)a->n * sizeof(hsep_real));
-    hsep_splines_transpose(splines, a->slacks.rows, first, a->dx);
+    hsep_splines_transpose(a->splines, a->slacks.rows, a->first, a->dx);
     hsep_cholesky_solve(a->factor, a->n, a->dx);
-    interior_rows(a, splines, first, a->dx);
+    interior_rows(a, a->dx);
 }
 
 /* Begin a step with its residuals; return whether there is none, as the plan is solved. */
-static int interior_residuals(
-    hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[])
+static int interior_residuals(hsep_interior *self, const interior_arrays *a, const hsep_real P[])
 {
     hsep_real r_p, beyond;
-    interior_rows(a, splines, self->first, a->x);
+    interior_rows(a, a->x);
     const hsep_real mu = slacks_take_residuals(&a->slacks, &r_p, &beyond);
     if (beyond < self->beyond) {
         self->beyond = beyond;
         memcpy(a->inner, a->x, (size_t)a->n * sizeof(hsep_real));
     }
-    const hsep_real r_d = interior_dual_residual(a, splines, self->first, P);
+    const hsep_real r_d = interior_dual_residual(a, P);
     if (self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
         (mu < self->tolerance.mu * self->cost && r_p < self->tolerance.margin && r_d < self->tolerance.dual_residual)) {
         return 1;
@@ -327,15 +325,13 @@ static int interior_residuals(
 }
 
 /* A part of the factor of P + A' W A, 0 to 2; return whether there is none. Work, not rows, is divided. */
-static int interior_factor(
-    const hsep_interior *self, const interior_arrays *a, const hsep_splines *splines, const hsep_real P[],
-    hsep_int part)
+static int interior_factor(const interior_arrays *a, const hsep_real P[], hsep_int part)
 {
     const hsep_int panel = HSEP_CHOLESKY_PANEL, ends[] = {0, a->n / 12 / panel * panel, a->n / 4 / panel * panel, a->n};
     if (part == 0) {
         memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
         slacks_weigh(&a->slacks);
-        hsep_splines_gram(splines, a->slacks.rows, self->first, a->factor, a->slacks.work);
+        hsep_splines_gram(a->splines, a->slacks.rows, a->first, a->factor, a->slacks.work);
     }
     return !hsep_cholesky_rows(a->factor, a->n, ends[part], ends[part + 1], NULL);
 }
@@ -346,10 +342,10 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
     const hsep_int part = self->part;
     self->part = (part + 1) % HSEP_INTERIOR_PARTS;
     if (part < 4) {
-        return part == 0 ? interior_residuals(self, &a, splines, P) : interior_factor(self, &a, splines, P, part - 1);
+        return part == 0 ? interior_residuals(self, &a, P) : interior_factor(&a, P, part - 1);
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
-    interior_direction(&a, splines, self->first);
+    interior_direction(&a);
     if (part == 4) {
         const hsep_real mu = self->mu, ratio = slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
         slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));

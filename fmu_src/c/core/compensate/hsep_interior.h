@@ -8,8 +8,7 @@
 #ifndef HSEP_INTERIOR_H
 #define HSEP_INTERIOR_H
 
-#include "hsep_api.h"
-#include "hsep_real.h"
+#include "hsep_layout.h"
 #include "hsep_splines.h"
 
 /* Where the solver ends. */

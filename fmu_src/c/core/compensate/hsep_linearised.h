@@ -13,9 +13,7 @@
 #ifndef HSEP_LINEARISED_H
 #define HSEP_LINEARISED_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
-#include "hsep_real.h"
 #include "hsep_averaged_model.h"
 
 /* Work is counted in multiply-adds of loops over arrays. As so many counts a number that is computed apart, with

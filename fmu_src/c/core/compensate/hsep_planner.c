@@ -4,7 +4,6 @@
 #include "hsep_math.h"
 #include "hsep_vector.h"
 
-#include <stddef.h>
 #include <string.h>
 
 static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
@@ -40,12 +39,11 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_p
     self->splines =
         hsep_take_block(&end, hsep_splines_lay_out(&(hsep_splines){0}, parameters->preview, parameters->spacing));
     self->interior = hsep_take_block(&end, hsep_interior_size(parameters->preview, n));
-    self->stop =
-        parameters->known < parameters->preview
-            ? hsep_take_block(
-                  &end, hsep_stop_lay_out(
-                            &(hsep_stop){0}, parameters->known, parameters->spacing, planner_shared(parameters)))
-            : 0;
+    if (parameters->known < parameters->preview) {
+        const hsep_int shared = planner_shared(parameters);
+        self->stop =
+            hsep_take_block(&end, hsep_stop_lay_out(&(hsep_stop){0}, parameters->known, parameters->spacing, shared));
+    }
     return end * sizeof(hsep_real);
 }
 
@@ -65,12 +63,10 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
     }
 }
 
-HSEP_API hsep_int hsep_planner_pinned(const hsep_planner *self)
-{
-    return self->n_pinned * hsep_planner_splines(self)->spacing;
-}
+/* The drive's limits are linear constraints on the rows of a plan (hsep_splines.h), in shares of a limit. */
 
-HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[])
+/* Rows of x_dm, of delta in order 0, under the remainder of the last plan, in shares; and the direction of x_d. */
+static void planner_total(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int preview = splines->preview;
@@ -93,7 +89,10 @@ HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[])
     }
 }
 
-HSEP_API void hsep_planner_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most)
+/* Bounds of a row, in shares. Where x_d itself exceeds a limit within the length of a spline, as a command that is held
+ * or rounded does, what it takes is added to the limit. The remainder of the last plan is always feasible, with a small
+ * margin: an interior-point method needs an interior. */
+static inline void planner_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most)
 {
     const hsep_int preview = hsep_planner_splines(self)->preview;
     const hsep_real total = hsep_at_const(self, self->total)[r];
@@ -110,14 +109,16 @@ HSEP_API void hsep_planner_range(const hsep_planner *self, hsep_int r, hsep_real
     *most = hsep_fmax(*most, total + HSEP_QP_INTERIOR);
 }
 
-HSEP_API hsep_real hsep_planner_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[])
+/* Largest feasible step length, 0 ... 1, by a step with rows way, from a feasible plan, whose rows are those of the
+ * remainder and from. */
+static hsep_real planner_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[])
 {
     const hsep_real *total = hsep_at_const(self, self->total);
     const hsep_int rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
     hsep_real share = 1.0;
     for (hsep_int r = 0; r < rows; r++) {
         hsep_real least, most;
-        hsep_planner_range(self, r, &least, &most);
+        planner_range(self, r, &least, &most);
         const hsep_real here = total[r] + from[r];
         const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? most - here : here - least;
         if (to > HSEP_QP_ROUNDING && room < share * to) {
@@ -127,14 +128,15 @@ HSEP_API hsep_real hsep_planner_share(const hsep_planner *self, const hsep_real 
     return share;
 }
 
-HSEP_API int hsep_planner_allow(const hsep_planner *self, const hsep_real way[])
+/* Whether the remainder and a step with rows way are feasible. */
+static int planner_allow(const hsep_planner *self, const hsep_real way[])
 {
     const hsep_real *total = hsep_at_const(self, self->total);
     const hsep_int rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
     for (hsep_int r = 0; r < rows; r++) {
         const hsep_real there = total[r] + way[r];
         hsep_real least, most;
-        hsep_planner_range(self, r, &least, &most);
+        planner_range(self, r, &least, &most);
         if (!(there <= most && there >= least)) {
             return 0;
         }
@@ -174,13 +176,6 @@ HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_re
     return bounded / (hsep_real)self->Np;
 }
 
-HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self) { return hsep_at(self, self->c); }
-
-HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first)
-{
-    return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
-}
-
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self)
 {
     return hsep_interior_problem(planner_interior(self), hsep_planner_splines(self)).v;
@@ -189,7 +184,7 @@ HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self)
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
 {
     (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED, hsep_at(self, self->third));
-    hsep_planner_total(self, x_d);
+    planner_total(self, x_d);
 }
 
 HSEP_API void hsep_planner_follow_friction(hsep_planner *self)
@@ -198,8 +193,7 @@ HSEP_API void hsep_planner_follow_friction(hsep_planner *self)
     (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED + self->n_pinned, hsep_at(self, self->third));
 }
 
-/* Add the jerk's cost of the splines first ... n - 1 to theirs, and make P positive definite. */
-static void planner_complete(hsep_planner *self, hsep_int first, hsep_real jerk_weight)
+HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first, hsep_real jerk_weight)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int n = splines->n - first;
@@ -215,28 +209,20 @@ static void planner_complete(hsep_planner *self, hsep_int first, hsep_real jerk_
     }
 }
 
-HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first)
-{
-    planner_complete(self, first, self->jerk_weight);
-}
-
 HSEP_API void hsep_planner_aim(
     hsep_planner *self, const hsep_real gram[], const hsep_real filtered[], const hsep_real target[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_real *v = hsep_planner_linear(self);
-    if (gram != NULL) {
-        memcpy(hsep_at(self, self->P), gram, (size_t)hsep_triangle(splines->n) * sizeof(hsep_real));
-    } else {
-        hsep_splines_filtered_gram(splines, filtered, hsep_at(self, self->P));
-    }
     for (hsep_int j = 0; j < splines->n; j++) { /* W' target */
         const hsep_int begin = j * splines->spacing;
         v[j] = hsep_dot(filtered, target + begin, splines->preview - begin);
     }
     if (gram == NULL) {
-        hsep_planner_complete(self, 0);
+        hsep_splines_filtered_gram(splines, filtered, hsep_at(self, self->P));
+        hsep_planner_complete(self, 0, self->jerk_weight);
     } else {
+        memcpy(hsep_at(self, self->P), gram, (size_t)hsep_triangle(splines->n) * sizeof(hsep_real));
         hsep_splines_add_jerk(splines, self->jerk_weight, hsep_at(self, self->third), 0, NULL, v);
     }
 }
@@ -256,7 +242,7 @@ HSEP_API void hsep_planner_gram(
             *P++ = sum;
         }
     }
-    hsep_planner_complete(self, 0);
+    hsep_planner_complete(self, 0, self->jerk_weight);
     memcpy(gram, hsep_at(self, self->P), (size_t)hsep_triangle(n) * sizeof(hsep_real));
 }
 
@@ -296,7 +282,7 @@ HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
         }
     }
     const hsep_real gain = 2.0 * hsep_sin(0.5 * HSEP_TWO_PI * HSEP_PLANNING_ENDS / (hsep_real)splines->preview);
-    planner_complete(self, 0, hsep_pow(gain, -6.0)); /* gain of a difference at that period */
+    hsep_planner_complete(self, 0, hsep_pow(gain, -6.0)); /* gain of a difference at that period */
     for (hsep_int i = n - self->Np / spacing; i < n; i++) {
         *hsep_planner_quadratic(self, i) *= HSEP_PLANNING_NEW;
     }
@@ -325,7 +311,7 @@ static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_toleran
     for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
         const hsep_real other = total[r] - low[r];
         hsep_real least, most;
-        hsep_planner_range(self, r, &least, &most);
+        planner_range(self, r, &least, &most);
         low[r] = least - other + tolerance->margin;
         high[r] = most - other - tolerance->margin;
     }
@@ -354,7 +340,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
         return HSEP_PLAN_FAILED;
     }
     hsep_splines_rows(splines, free_minimum, first, rows);
-    if (hsep_planner_allow(self, rows)) {
+    if (planner_allow(self, rows)) {
         for (hsep_int j = 0; j < n; j++) {
             rest[j] += free_minimum[j];
         }
@@ -396,7 +382,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
     if (isfinite(finite)) { /* bounds that are exceeded, as steps are limited, are so by little */
         hsep_splines_rows(splines, way, self->n_pinned, rows);
         hsep_splines_rows(splines, at, self->n_pinned, from);
-        const hsep_real share = hsep_planner_share(self, from, rows);
+        const hsep_real share = planner_share(self, from, rows);
         for (hsep_int j = 0; j < n; j++) {
             rest[j] += at[j] + share * way[j];
         }

@@ -11,10 +11,8 @@
 #ifndef HSEP_PLANNER_H
 #define HSEP_PLANNER_H
 
-#include "hsep_api.h"
 #include "hsep_interior.h"
 #include "hsep_layout.h"
-#include "hsep_real.h"
 #include "hsep_splines.h"
 #include "hsep_stop.h"
 
@@ -56,6 +54,9 @@ static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
     return (const hsep_splines *)hsep_at_const(self, self->splines);
 }
 
+/* Coefficients of the plan, (3 + n,), m; until it is made, of the remainder of the last plan. */
+static inline hsep_real *hsep_planner_coefficients(hsep_planner *self) { return hsep_at(self, self->c); }
+
 /* delta at sample k of the plan, m; of a bounded one that is not solved yet, at its first hsep_planner_pinned. */
 static inline hsep_real hsep_planner_delta(const hsep_planner *self, hsep_int k)
 {
@@ -77,7 +78,10 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
 
 /* Samples that a bounded plan leaves as they are: the time to solve it in. */
-HSEP_API hsep_int hsep_planner_pinned(const hsep_planner *self);
+static inline hsep_int hsep_planner_pinned(const hsep_planner *self)
+{
+    return self->n_pinned * hsep_planner_splines(self)->spacing;
+}
 
 /* Begin plans of a window. x_d: commanded positions, m, (preview,). */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
@@ -107,13 +111,14 @@ HSEP_API void hsep_planner_pin(hsep_planner *self);
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
 
 /* The cost 1/2 c' P c - v' c of the splines first ... n - 1, for a caller that sets it itself: the triangle P of n -
- * first rows, and v, (n - first,), m; hsep_planner_complete adds the jerk's and makes P positive definite. */
-HSEP_API hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first);
+ * first rows, and v, (n - first,), m; hsep_planner_complete adds the jerk's, times a weight, and makes P positive
+ * definite. */
+static inline hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first)
+{
+    return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
+}
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
-HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first);
-
-/* Coefficients of the plan, (3 + n,), m; until it is made, of the remainder of the last plan. */
-HSEP_API hsep_real *hsep_planner_coefficients(hsep_planner *self);
+HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first, hsep_real jerk_weight);
 
 /* Begin to plan at this cost; return whether it has a minimum. pinned: as below. Cost: n^3 / 6 multiply-adds. */
 HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned);
@@ -140,22 +145,5 @@ HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);
-
-/* The drive's limits as linear constraints on the rows of a plan (hsep_splines.h), in shares of a limit. */
-
-/* Rows of x_dm, of delta in order 0, under the remainder of the last plan, in shares; and the direction of x_d. */
-HSEP_API void hsep_planner_total(hsep_planner *self, const hsep_real x_d[]);
-
-/* Bounds of a row, in shares. Where x_d itself exceeds a limit within the length of a spline, as a command that is held
- * or rounded does, what it takes is added to the limit. The remainder of the last plan is always feasible, with a small
- * margin: an interior-point method needs an interior. */
-HSEP_API void hsep_planner_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most);
-
-/* Largest feasible step length, 0 ... 1, by a step with rows way, from a feasible plan, whose rows are those of the
- * remainder and from. */
-HSEP_API hsep_real hsep_planner_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[]);
-
-/* Whether the remainder and a step with rows way are feasible. */
-HSEP_API int hsep_planner_allow(const hsep_planner *self, const hsep_real way[]);
 
 #endif

@@ -10,10 +10,8 @@
 #ifndef HSEP_SPLINES_H
 #define HSEP_SPLINES_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_plan_constants.h"
-#include "hsep_real.h"
 #include "hsep_vector.h"
 
 #define HSEP_ORDERS 4                          /* orders of difference: 0, the change itself, to 3, its jerk */
@@ -41,7 +39,10 @@ static inline void hsep_differ(hsep_real differences[HSEP_ORDERS], hsep_real val
 }
 
 /* Splines that begin in a plan and end four samples before it does, or earlier. preview >= 4 spacing + 3. */
-HSEP_API hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing);
+static inline hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing)
+{
+    return (preview - 4 * spacing - HSEP_SPLINES_END) / spacing + 1;
+}
 
 HSEP_API hsep_real hsep_splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int spacing);
 /* Fill the block. limit: of the change, m, and of its differences of orders 1 to 3, m a sample to that power. */
@@ -87,6 +88,6 @@ HSEP_API void hsep_splines_add_jerk(
     hsep_real v[]);
 
 /* The spline itself, b, (4 spacing,). */
-HSEP_API const hsep_real *hsep_splines_shape(const hsep_splines *self);
+static inline const hsep_real *hsep_splines_shape(const hsep_splines *self) { return hsep_at_const(self, self->shape); }
 
 #endif

@@ -139,7 +139,7 @@ HSEP_API void hsep_stop_carry_out(
     hsep_real *last = hsep_at(self, self->last), *own = hsep_at(self, self->own), *now = hsep_at(self, self->now);
     hsep_real *start = hsep_at(self, self->start), *way = hsep_at(self, self->way);
     hsep_real *own_rows = hsep_at(self, self->own_rows), length = 1.0, share = 1.0;
-    int is_found = 0;
+    int tries = 0;
     memcpy(own, last, shared);
     stop_behind(self, own);
     for (hsep_int i = 0; i < self->count; i++) {
@@ -155,14 +155,10 @@ HSEP_API void hsep_stop_carry_out(
         start[r] -= own_rows[r];
         way[r] -= start[r];
     }
-    for (int i = 0; i < HSEP_STOP_TRIES; i++) {
-        is_found = stop_share(self, length, &share);
-        if (is_found) {
-            break;
-        }
+    for (; tries < HSEP_STOP_TRIES && !stop_share(self, length, &share); tries++) {
         length *= HSEP_STOP_SHORTER;
     }
-    if (!is_found) { /* the last stop goes on */
+    if (tries == HSEP_STOP_TRIES) { /* the last stop goes on */
         length = 0.0;
         share = 1.0;
     }

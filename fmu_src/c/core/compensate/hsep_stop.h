@@ -10,9 +10,7 @@
 #ifndef HSEP_STOP_H
 #define HSEP_STOP_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
-#include "hsep_real.h"
 #include "hsep_splines.h"
 
 #define HSEP_STOP_WORK 250.0 /* multiply-adds for each sample of the preview to carry out a plan */

@@ -5,7 +5,6 @@
 
 #include <string.h>
 
-/* Set what follows from the number of features; return the bytes of the block. */
 static hsep_real gram_lay_out(hsep_gram *self, hsep_int n)
 {
     hsep_real end = HSEP_WORDS(hsep_gram);

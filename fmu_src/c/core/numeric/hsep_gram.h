@@ -8,7 +8,6 @@
 #ifndef HSEP_GRAM_H
 #define HSEP_GRAM_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
 
 #define HSEP_GRAM_TOGETHER 4 /* rows that are added in one go */

@@ -7,7 +7,6 @@
 
 static const hsep_real regression_lambda_min = HSEP_TINY(1e-290);
 
-/* Set what follows from the number of features; return the bytes of the block. */
 static hsep_real regression_lay_out(hsep_regression *self, hsep_int n)
 {
     hsep_real end = HSEP_WORDS(hsep_regression);

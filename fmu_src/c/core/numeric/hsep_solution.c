@@ -6,7 +6,6 @@
 
 #include <string.h>
 
-/* Set what follows from the parameters; return the bytes of the block. */
 static hsep_real solution_lay_out(hsep_solution *self, hsep_int n_head, hsep_int n_tail, hsep_int room)
 {
     const hsep_real n = (hsep_real)n_head + (hsep_real)n_tail;

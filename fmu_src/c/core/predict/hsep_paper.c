@@ -4,12 +4,6 @@
 
 #include <string.h>
 
-HSEP_API hsep_regression *hsep_paper_regression(hsep_paper *self)
-{
-    return (hsep_regression *)hsep_at(self, self->regression);
-}
-
-/* Set what follows from the settings; return the bytes of the block. */
 HSEP_API hsep_real hsep_paper_lay_out(hsep_paper *self, const hsep_predictor_settings *settings)
 {
     hsep_real end = HSEP_WORDS(hsep_paper);

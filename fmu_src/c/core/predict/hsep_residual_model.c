@@ -3,7 +3,6 @@
 #include "hsep_cholesky.h"
 
 #include <float.h>
-#include <stddef.h>
 #include <string.h>
 
 #ifdef HSEP_FLOAT32
@@ -15,16 +14,6 @@
 /* Parts in which the averaged model predicts a window behind its first sample, as variances are dear. */
 static const hsep_int residual_parts = 25;
 
-HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self)
-{
-    return self->paper ? (hsep_paper *)hsep_at(self, self->paper) : NULL;
-}
-
-HSEP_API hsep_averaged *hsep_residual_averaged(hsep_residual_model *self)
-{
-    return self->averaged ? (hsep_averaged *)hsep_at(self, self->averaged) : NULL;
-}
-
 HSEP_API hsep_real hsep_residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
 {
     hsep_real end = HSEP_WORDS(hsep_residual_model);
@@ -32,12 +21,11 @@ HSEP_API hsep_real hsep_residual_lay_out(hsep_residual_model *self, const hsep_r
     self->late = hsep_late(parameters->settings);
     self->n = self->Np + self->late;
     self->planned = parameters->planned != 0;
-    self->paper = parameters->averaging->averaging
-                      ? 0
-                      : hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, parameters->settings));
-    self->averaged = parameters->averaging->averaging
-                         ? hsep_take_block(&end, hsep_averaged_lay_out(&(hsep_averaged){0}, parameters))
-                         : 0;
+    if (parameters->averaging->averaging) {
+        self->averaged = hsep_take_block(&end, hsep_averaged_lay_out(&(hsep_averaged){0}, parameters));
+    } else {
+        self->paper = hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, parameters->settings));
+    }
     return end * sizeof(hsep_real);
 }
 
@@ -55,11 +43,6 @@ HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_
 static hsep_gram *residual_gram(hsep_residual_model *self, hsep_int factor)
 {
     return hsep_warm_start_of_run(hsep_averaged_evidence(hsep_residual_averaged(self), factor));
-}
-
-HSEP_API hsep_int hsep_residual_n_factors(const hsep_residual_model *self)
-{
-    return self->averaged ? HSEP_N_RESIDUALS : 1;
 }
 
 HSEP_API hsep_int hsep_residual_n_features(hsep_residual_model *self, hsep_int factor)
@@ -110,16 +93,6 @@ HSEP_API hsep_real hsep_residual_factor(hsep_residual_model *self, hsep_int fact
     return hsep_warm_start_n_rows(evidence);
 }
 
-HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self)
-{
-    return self->averaged ? HSEP_LEARNED_WORDS + hsep_residual_averaged(self)->n_static : 0;
-}
-
-HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self)
-{
-    return self->averaged ? &hsep_residual_averaged(self)->learned.velocity_scale : NULL;
-}
-
 HSEP_API void hsep_residual_restart(hsep_residual_model *self)
 {
     if (self->averaged) {
@@ -166,12 +139,6 @@ HSEP_API void hsep_residual_predict(
     }
 }
 
-HSEP_API const hsep_real *hsep_residual_variance(hsep_residual_model *self)
-{
-    hsep_averaged *averaged = hsep_residual_averaged(self);
-    return averaged != NULL ? hsep_at(averaged, averaged->variance) + (averaged->n - self->n) : NULL;
-}
-
 HSEP_API void hsep_residual_take_in(
     hsep_residual_model *self, const hsep_residual_window *window, const hsep_residual_sample *sample)
 {
@@ -197,15 +164,4 @@ HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual
             self->learning != 0);
     }
     return self->learning != 0;
-}
-
-HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self)
-{
-    hsep_averaged *averaged = hsep_residual_averaged(self);
-    return averaged != NULL ? hsep_at(averaged, averaged->accepted) : NULL;
-}
-
-HSEP_API hsep_int hsep_residual_n_rejected(const hsep_residual_model *self)
-{
-    return self->averaged ? ((const hsep_averaged *)hsep_at_const(self, self->averaged))->n_rejected : 0;
 }

@@ -27,12 +27,21 @@ HSEP_API void hsep_residual_init(
     hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start);
 
 /* The implementation; NULL if it is the other one. */
-HSEP_API hsep_paper *hsep_residual_paper(hsep_residual_model *self);
-HSEP_API hsep_averaged *hsep_residual_averaged(hsep_residual_model *self);
+static inline hsep_paper *hsep_residual_paper(hsep_residual_model *self)
+{
+    return self->paper ? (hsep_paper *)hsep_at(self, self->paper) : NULL;
+}
+static inline hsep_averaged *hsep_residual_averaged(hsep_residual_model *self)
+{
+    return self->averaged ? (hsep_averaged *)hsep_at(self, self->averaged) : NULL;
+}
 
 /* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of
  * one of them. The first one has the rows of the physics model's residual. */
-HSEP_API hsep_int hsep_residual_n_factors(const hsep_residual_model *self);
+static inline hsep_int hsep_residual_n_factors(const hsep_residual_model *self)
+{
+    return self->averaged ? HSEP_N_RESIDUALS : 1;
+}
 HSEP_API hsep_int hsep_residual_n_features(hsep_residual_model *self, hsep_int factor);
 
 /* Where row i of a factor goes, its entries i ... n, and take it over. n_rows: rows that the
@@ -45,8 +54,14 @@ HSEP_API void hsep_residual_load(hsep_residual_model *self, hsep_int factor, hse
 HSEP_API hsep_real hsep_residual_factor(hsep_residual_model *self, hsep_int factor, hsep_real triangle[]);
 
 /* Numbers learned besides them, the first of so many; none without averaging. */
-HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self);
-HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
+static inline hsep_int hsep_residual_n_learned(hsep_residual_model *self)
+{
+    return self->averaged ? HSEP_LEARNED_WORDS + hsep_residual_averaged(self)->n_static : 0;
+}
+static inline hsep_real *hsep_residual_learned(hsep_residual_model *self)
+{
+    return self->averaged ? &hsep_residual_averaged(self)->learned.velocity_scale : NULL;
+}
 
 /* Begin a run with what an earlier one has learned, once it is loaded into a fresh block. */
 HSEP_API void hsep_residual_restart(hsep_residual_model *self);
@@ -65,7 +80,11 @@ HSEP_API void hsep_residual_predict(
     hsep_residual_model *self, const hsep_residual_window *window, hsep_int first, hsep_int last);
 
 /* What the model knows of the errors of a predicted window, (n,) m2, newest first; NULL: nothing. */
-HSEP_API const hsep_real *hsep_residual_variance(hsep_residual_model *self);
+static inline const hsep_real *hsep_residual_variance(hsep_residual_model *self)
+{
+    hsep_averaged *averaged = hsep_residual_averaged(self);
+    return averaged != NULL ? hsep_at(averaged, averaged->variance) + (averaged->n - self->n) : NULL;
+}
 
 /* Take in a sample of the window. */
 HSEP_API void hsep_residual_take_in(
@@ -76,9 +95,16 @@ HSEP_API void hsep_residual_take_in(
 HSEP_API int hsep_residual_finish(hsep_residual_model *self, const hsep_residual_window *window);
 
 /* Samples of a finished window that count, (Np,) newest first, 1 or 0; NULL: all. */
-HSEP_API const hsep_real *hsep_residual_accepted(hsep_residual_model *self);
+static inline const hsep_real *hsep_residual_accepted(hsep_residual_model *self)
+{
+    hsep_averaged *averaged = hsep_residual_averaged(self);
+    return averaged != NULL ? hsep_at(averaged, averaged->accepted) : NULL;
+}
 
 /* Measurements of this run that were missing or not plausible. */
-HSEP_API hsep_int hsep_residual_n_rejected(const hsep_residual_model *self);
+static inline hsep_int hsep_residual_n_rejected(const hsep_residual_model *self)
+{
+    return self->averaged ? ((const hsep_averaged *)hsep_at_const(self, self->averaged))->n_rejected : 0;
+}
 
 #endif

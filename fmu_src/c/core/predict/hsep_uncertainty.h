@@ -7,10 +7,8 @@
 #ifndef HSEP_UNCERTAINTY_H
 #define HSEP_UNCERTAINTY_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_predict_constants.h"
-#include "hsep_real.h"
 
 #define HSEP_N_UNCERTAINTY (2 * HSEP_UNCERTAINTY_N_COMPONENTS + 3) /* numbers that are learned, each >= 0 */
 

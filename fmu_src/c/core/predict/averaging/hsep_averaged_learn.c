@@ -86,8 +86,8 @@ static void averaged_fold(hsep_averaged *self, hsep_int kind, hsep_int k, const 
     memcpy(to, rows + k * n_static, (size_t)n_static * sizeof(hsep_real));
     memcpy(to + n_static, lags, (size_t)p * sizeof(hsep_real));
     to[gram->n] = lags[-1];
-    for (hsep_int i = HSEP_REGRESSIONS; k >= self->early && i < HSEP_REGRESSIONS_END;
-         i++) { /* their solutions may have begun */
+    /* Behind early samples the next solutions may have begun. */
+    for (hsep_int i = HSEP_REGRESSIONS; k >= self->early && i < HSEP_REGRESSIONS_END; i++) {
         hsep_solution *solution = hsep_averaged_solution(self, i);
         if (hsep_averaged_kind_of(self, i) == kind && solution != NULL && solution->begun) {
             hsep_solution_row(solution, to, lags[-1]);
@@ -199,13 +199,10 @@ static void averaged_believe(
     e[j] = measured;
     averaged_bridge(self, e, j + 1);
     averaged_take_rows(self, x_pb, e, k + 1);
-    for (hsep_int i = 0; fold && i < HSEP_N_RESIDUALS; i++) {
+    if (fold) {
         const hsep_command *command = hsep_averaged_command(self);
-        if (i == HSEP_COMMAND_RESIDUAL) {
-            averaged_fold(self, i, k, hsep_at_const(command, command->rows), hsep_at(self, self->e_0));
-        } else {
-            averaged_fold(self, i, k, hsep_at(self, self->rows), e);
-        }
+        averaged_fold(self, HSEP_MODEL_RESIDUAL, k, hsep_at(self, self->rows), e);
+        averaged_fold(self, HSEP_COMMAND_RESIDUAL, k, hsep_at_const(command, command->rows), hsep_at(self, self->e_0));
     }
     self->n_accepted += 1.0;
 }

@@ -3,18 +3,11 @@
 
 #include "hsep_math.h"
 
-#include <stddef.h>
-
 /* Features of the rows of some evidence. */
 static hsep_int averaged_n_features(const hsep_averaged *self, hsep_int kind)
 {
     return kind == HSEP_COMMAND_RESIDUAL ? HSEP_COMMAND_FEATURES + HSEP_AVERAGING_LAGS_OF_COMMAND
                                          : self->n_static + self->p;
-}
-
-HSEP_API hsep_int hsep_averaged_kind_of(const hsep_averaged *self, hsep_int expert)
-{
-    return hsep_expert_of(hsep_expert_of(expert).is_fresh ? self->leading : expert).target;
 }
 
 static hsep_expert_shape averaged_shape(const hsep_averaged *self, hsep_int expert)
@@ -93,11 +86,6 @@ HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parame
         hsep_expert_init(hsep_averaged_expert(self, i), &shape);
         self->learned.errors[i - HSEP_REGRESSIONS].correlation = 1.0;
     }
-}
-
-HSEP_API int hsep_averaged_doubts(hsep_averaged *self)
-{
-    return hsep_warm_start_earlier(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL))->n_rows > 0.0;
 }
 
 HSEP_API hsep_solution *hsep_averaged_solution(hsep_averaged *self, hsep_int expert)

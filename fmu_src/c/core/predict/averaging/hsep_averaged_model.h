@@ -117,10 +117,16 @@ static inline hsep_expert *hsep_averaged_expert(hsep_averaged *self, hsep_int ex
 }
 
 /* HSEP_COMMAND_RESIDUAL if an expert predicts the residual of the command, else HSEP_MODEL_RESIDUAL. */
-HSEP_API hsep_int hsep_averaged_kind_of(const hsep_averaged *self, hsep_int expert);
+static inline hsep_int hsep_averaged_kind_of(const hsep_averaged *self, hsep_int expert)
+{
+    return hsep_expert_of(hsep_expert_of(expert).is_fresh ? self->leading : expert).target;
+}
 
 /* Whether this run doubts earlier ones. */
-HSEP_API int hsep_averaged_doubts(hsep_averaged *self);
+static inline int hsep_averaged_doubts(hsep_averaged *self)
+{
+    return hsep_warm_start_earlier(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL))->n_rows > 0.0;
+}
 
 /* The solution of an expert; NULL where no rows train it. */
 HSEP_API hsep_solution *hsep_averaged_solution(hsep_averaged *self, hsep_int expert);
@@ -160,8 +166,8 @@ HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real
 /* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_AVERAGED_PACE of them in a
  * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
  * residuals; where a measurement is not believed, the predicted one, shifted as the believed ones beside it are off;
- * behind it those before. A
- * sample costs a hsep_gram_fold for each residual, and behind early samples a share of the next window's solutions. */
+ * behind it those before. A sample costs a hsep_gram_fold for each residual, and behind early samples a share of the
+ * next window's solutions. */
 HSEP_API void hsep_averaged_follow(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last);
 

@@ -4,8 +4,6 @@
 #include "hsep_predict_constants.h"
 #include "hsep_vector.h"
 
-#include <stddef.h>
-
 HSEP_API void hsep_residual_scale_follow(
     hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count)
 {

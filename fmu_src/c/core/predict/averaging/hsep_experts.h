@@ -7,10 +7,8 @@
 #ifndef HSEP_EXPERTS_H
 #define HSEP_EXPERTS_H
 
-#include "hsep_api.h"
 #include "hsep_warm_start.h"
 #include "hsep_layout.h"
-#include "hsep_real.h"
 #include "hsep_solution.h"
 
 /* Size of the residuals so far. */

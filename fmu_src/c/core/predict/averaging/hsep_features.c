@@ -1,22 +1,6 @@
 #include "hsep_features.h"
 
-#include "hsep_math.h"
-
-#include <stddef.h>
-#include <string.h>
-
 #define DISTURBANCES_TOGETHER 64 /* samples that are filtered in one go */
-
-HSEP_API hsep_int hsep_disturbances_count(const hsep_residual_parameters *parameters)
-{
-    return parameters->averaging->period > 0.0 ? HSEP_DISTURBANCES_MAX : HSEP_FEATURES_N_LASTING;
-}
-
-HSEP_API hsep_int hsep_disturbances_n(const hsep_residual_parameters *parameters)
-{
-    const hsep_int q = parameters->settings->q, most = HSEP_FEATURES_DIFFERENCES;
-    return 2 + (q < most ? q : most) + 2 * hsep_disturbances_count(parameters);
-}
 
 /* Filter i before the window; behind all of these are the filters after the samples that were tried. */
 static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_int i)
@@ -221,11 +205,6 @@ HSEP_API hsep_real hsep_disturbances_turned(const hsep_disturbances *self, const
     return hsep_fmin(hsep_fmax(turned, 0.0), 1.0);
 }
 
-HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_real x)
-{
-    return self->period > 0.0 ? HSEP_TWO_PI / self->period * (self->origin + x) : 0.0;
-}
-
 HSEP_API void hsep_disturbances_motion(
     hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_int n, hsep_int first, hsep_int last,
     hsep_real rows[])
@@ -281,11 +260,6 @@ HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_residual_
     return end * sizeof(hsep_real);
 }
 
-HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m)
-{
-    memcpy(hsep_at(self, self->commands) + (self->n - m), x_d, (size_t)m * sizeof(hsep_real));
-}
-
 HSEP_API void hsep_command_fill(hsep_command *self, hsep_int m, hsep_int first, hsep_int last)
 {
     const hsep_real *commands = hsep_at(self, self->commands) + (self->n - m);
@@ -297,11 +271,6 @@ HSEP_API void hsep_command_fill(hsep_command *self, hsep_int m, hsep_int first, 
             row[i] = late[i - 1] - late[i];
         }
     }
-}
-
-HSEP_API const hsep_real *hsep_command_late(const hsep_command *self, hsep_int m)
-{
-    return hsep_at_const(self, self->commands) + (self->n - m) + self->dead_time;
 }
 
 HSEP_API void hsep_command_end(hsep_command *self, hsep_int m)

@@ -9,12 +9,13 @@
 #ifndef HSEP_FEATURES_H
 #define HSEP_FEATURES_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
+#include "hsep_math.h"
 #include "hsep_physics.h"
 #include "hsep_predict_constants.h"
-#include "hsep_real.h"
 #include "hsep_window.h"
+
+#include <string.h>
 
 #define HSEP_DISTURBANCES_OF_COMMAND (HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS)
 #define HSEP_DISTURBANCES_STIFFNESS HSEP_DISTURBANCES_OF_COMMAND /* place, behind friction and stop operators */
@@ -51,8 +52,15 @@ HSEP_ASSERT_WORDS(hsep_disturbed, 1 + HSEP_DISTURBANCES_PAST + HSEP_DISTURBANCES
 HSEP_ASSERT_WORDS(hsep_disturbances, 9 + 2 * sizeof(hsep_disturbed) / sizeof(hsep_real));
 
 /* Disturbances, and features. */
-HSEP_API hsep_int hsep_disturbances_count(const hsep_residual_parameters *parameters);
-HSEP_API hsep_int hsep_disturbances_n(const hsep_residual_parameters *parameters);
+static inline hsep_int hsep_disturbances_count(const hsep_residual_parameters *parameters)
+{
+    return parameters->averaging->period > 0.0 ? HSEP_DISTURBANCES_MAX : HSEP_FEATURES_N_LASTING;
+}
+static inline hsep_int hsep_disturbances_n(const hsep_residual_parameters *parameters)
+{
+    const hsep_int q = parameters->settings->q, most = HSEP_FEATURES_DIFFERENCES;
+    return 2 + (q < most ? q : most) + 2 * hsep_disturbances_count(parameters);
+}
 
 HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep_residual_parameters *parameters);
 /* Fill the block, which is 0, at rest at start, m. */
@@ -95,7 +103,10 @@ HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
 HSEP_API hsep_real hsep_disturbances_spread(hsep_real velocity_scale, hsep_int i);
 HSEP_API hsep_real hsep_disturbances_damped_velocity(
     const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real x[], hsep_int n, hsep_int j);
-HSEP_API hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_real x);
+static inline hsep_real hsep_disturbances_angle(const hsep_disturbances *self, hsep_real x)
+{
+    return self->period > 0.0 ? HSEP_TWO_PI / self->period * (self->origin + x) : 0.0;
+}
 
 /* Features of the command without lags: 1, and the increments. */
 #define HSEP_COMMAND_FEATURES (HSEP_AVERAGING_LAGS_OF_COMMAND + 2)
@@ -117,13 +128,19 @@ HSEP_ASSERT_WORDS(hsep_command, 5);
 HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_residual_parameters *parameters);
 
 /* Take in the commands of the m samples that come next, (m,), m, m <= n; may be tried again with others. */
-HSEP_API void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m);
+static inline void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m)
+{
+    memcpy(hsep_at(self, self->commands) + (self->n - m), x_d, (size_t)m * sizeof(hsep_real));
+}
 
 /* Fill the rows of samples first ... last - 1 of these. */
 HSEP_API void hsep_command_fill(hsep_command *self, hsep_int m, hsep_int first, hsep_int last);
 
 /* Of these, the commands dead_time samples ago, (m,), m. */
-HSEP_API const hsep_real *hsep_command_late(const hsep_command *self, hsep_int m);
+static inline const hsep_real *hsep_command_late(const hsep_command *self, hsep_int m)
+{
+    return hsep_at_const(self, self->commands) + (self->n - m) + self->dead_time;
+}
 
 /* End the window, which are the m samples taken in last. */
 HSEP_API void hsep_command_end(hsep_command *self, hsep_int m);

@@ -7,9 +7,7 @@
 #ifndef HSEP_RECALL_H
 #define HSEP_RECALL_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
-#include "hsep_real.h"
 #include "hsep_window.h"
 
 typedef struct {

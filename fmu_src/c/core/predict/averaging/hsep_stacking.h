@@ -4,7 +4,6 @@
 #ifndef HSEP_STACKING_H
 #define HSEP_STACKING_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_predict_constants.h"
 

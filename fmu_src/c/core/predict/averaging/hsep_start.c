@@ -4,7 +4,6 @@
 #include "hsep_predict_constants.h"
 #include "hsep_regression.h"
 
-#include <stddef.h>
 #include <string.h>
 
 HSEP_API hsep_real hsep_start_lay_out(hsep_start *self, const hsep_residual_parameters *parameters)

@@ -5,10 +5,8 @@
 #ifndef HSEP_START_H
 #define HSEP_START_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
 #include "hsep_physics.h"
-#include "hsep_real.h"
 #include "hsep_window.h"
 
 typedef struct {
