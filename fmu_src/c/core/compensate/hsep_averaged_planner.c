@@ -1,6 +1,5 @@
 #include "hsep_averaged_planner.h"
 
-#include "hsep_cholesky.h"
 #include "hsep_math.h"
 #include "hsep_vector.h"
 
@@ -12,58 +11,6 @@ static const hsep_tolerance averaged_planner_tolerance = {HSEP_NEWTON_TOLERANCE}
 
 HSEP_ASSERT(reaches, sizeof averaged_planner_reaches == HSEP_AVERAGED_STEPS * sizeof(hsep_real));
 HSEP_ASSERT(lengths, sizeof averaged_planner_lengths == HSEP_AVERAGED_TRIES * sizeof(hsep_real));
-
-HSEP_API hsep_real hsep_averaged_planner_lay_out(
-    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
-{
-    const hsep_int n = hsep_splines_count(planner->preview, planner->spacing);
-    const hsep_real all = (hsep_real)parameters->n, coefficients = HSEP_N_DECIDED + (hsep_real)n,
-                    filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
-    const hsep_int n_pinned = hsep_planner_n_pinned(planner);
-    const hsep_real columns = (hsep_real)(n - n_pinned);
-    const hsep_real longest = (hsep_real)(planner->preview - planner->spacing * n_pinned);
-    hsep_real end = HSEP_WORDS(hsep_averaged_planner);
-    self->preview = planner->preview;
-    self->late = hsep_late(parameters->settings);
-    self->p = parameters->settings->p;
-    self->Np = planner->Np;
-    self->n = n;
-    self->n_pinned = n_pinned;
-    const hsep_int fit = n_pinned * planner->spacing / HSEP_NEWTON_STEP;
-    self->n_steps = fit < 1 ? 1 : fit < HSEP_AVERAGED_STEPS ? fit : HSEP_AVERAGED_STEPS;
-    self->rest = hsep_take(&end, coefficients);
-    self->best = hsep_take(&end, coefficients);
-    self->of_physics = hsep_take(&end, coefficients);
-    self->command = hsep_take(&end, all);
-    self->x_pb = hsep_take(&end, all);
-    self->e_h = hsep_take(&end, all + (hsep_real)self->p);
-    self->target = hsep_take(&end, (hsep_real)planner->preview);
-    self->weight = hsep_take(&end, (hsep_real)planner->preview);
-    self->gram = hsep_take(&end, hsep_triangle(n));
-    self->W = hsep_take(&end, columns * longest - (hsep_real)planner->spacing * 0.5 * columns * (columns - 1.0));
-    self->linearised = hsep_take_block(&end, hsep_linearised_lay_out(&(hsep_linearised){0}, parameters));
-    self->physics = hsep_take_block(&end, filter);
-    self->trial = hsep_take_block(&end, filter);
-    return end * sizeof(hsep_real);
-}
-
-HSEP_API void hsep_averaged_planner_init(
-    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
-    hsep_real start, hsep_planner *plans, const hsep_real spline[])
-{
-    (void)hsep_averaged_planner_lay_out(self, parameters, planner);
-    self->start = start;
-    self->pause =
-        (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings->T_s) + 0.5);
-    hsep_linearised_init((hsep_linearised *)hsep_at(self, self->linearised), parameters);
-    const hsep_int half = self->preview / 2, begin = self->Np > half ? self->Np : half, falling = self->preview - begin;
-    hsep_real *weight = hsep_at(self, self->weight);
-    for (hsep_int k = 0; k < self->preview; k++) {
-        const hsep_real left = (hsep_real)(self->preview - k) / (hsep_real)(falling + 1);
-        weight[k] = k < begin ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
-    }
-    hsep_planner_gram(plans, spline, weight, hsep_at(self, self->gram));
-}
 
 /* Whether a plan costs less than another; not if it is NaN. */
 static int averaged_planner_better(hsep_real cost, hsep_real other)
@@ -101,7 +48,8 @@ static hsep_real averaged_planner_fastest(const hsep_averaged_planner *self, con
     return fastest;
 }
 
-/* Whether the unmodified commands, and x_pb behind them, outgrow what is learned by HSEP_PLANNING_FASTER. */
+/* Whether the unmodified commands, and the physics model behind them, outgrow what is learned by HSEP_PLANNING_FASTER.
+ */
 static int averaged_planner_outgrows(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     averaged_planner_command(self, task, hsep_at(self, self->rest), 0);
@@ -277,7 +225,8 @@ static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averag
     return status != HSEP_PLAN_FAILED;
 }
 
-/* Judge a length of a step, whose end the planner has, and take it if it is better; otherwise try a shorter one. */
+/* Judge a length of a step, whose end the planner has, and take it if it is better; otherwise a shorter one is tried.
+ */
 static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);

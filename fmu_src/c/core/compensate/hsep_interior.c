@@ -112,7 +112,8 @@ static slacks_step_lengths slacks_lengths(const slacks *self)
 }
 
 /* Return mu, the mean of s z, with B x in ds; *primal: the largest primal residual; *beyond: by how much the worst
- * bound is exceeded, negative inside all of them. Set the predictor's r_c, as if s z = 0 could be reached at once. */
+ * bound is exceeded, negative inside all of them. The predictor's r_c is set, as if s z = 0 could be reached at once.
+ */
 static hsep_real slacks_take_residuals(const slacks *self, hsep_real *primal, hsep_real *beyond)
 {
     const slacks it = *self;
@@ -271,7 +272,8 @@ HSEP_API void hsep_interior_begin(
     slacks_begin(&a.slacks, self->cost);
 }
 
-/* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its terms. */
+/* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its
+ * terms. */
 static hsep_real interior_dual_residual(const interior_arrays *a, const hsep_real *P)
 {
     hsep_real residual = 0.0, largest = 0.0;

@@ -68,6 +68,12 @@ HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_pa
         settings->T_s, (hsep_hold)settings->input_hold);
 }
 
+/* Index of a disturbance's first weight among the weights of an expert. */
+static hsep_int linearised_first(const hsep_linearised *self, const hsep_averaged *model)
+{
+    return model->n_static - 2 * self->count;
+}
+
 /* Gains of an expert, (n,) each, from a change of v_d, x and v to its prediction: of friction, position and damping and
  * of their differences, as filters of v_d and x alone. weights: of the disturbances, then of their differences. */
 static void linearised_gains(
@@ -227,7 +233,7 @@ static void linearised_slopes(
 
 HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change)
 {
-    const hsep_int of_x_pb = model->n_static - 2 * self->count - 1; /* features behind the first one, which is 1 */
+    const hsep_int first = linearised_first(self, model);
     const hsep_real T_s = hsep_averaged_disturbances(model)->T_s;
     hsep_real *commands = hsep_at(self, self->commands); /* the change as x_d, v_d and x */
     hsep_real *velocity = hsep_at(self, self->velocity) + LINEARISED_BEFORE;
@@ -243,7 +249,7 @@ HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model,
         if (linearised_counts(model, linearised_experts[i])) {
             const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
             linearised_pass(
-                hsep_expert_weights(expert) + 1, of_x_pb, change->passed, self->preview,
+                hsep_expert_weights(expert) + 1, first - 1, change->passed, self->preview,
                 hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1));
         }
     }
@@ -252,7 +258,7 @@ HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model,
 HSEP_API void hsep_linearised_at(
     hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
 {
-    const hsep_int n = self->n, first = model->n_static - 2 * self->count; /* weight of a disturbance */
+    const hsep_int n = self->n, first = linearised_first(self, model);
     linearised_slopes(self, model, x_d, x_pb, reach);
     for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++) {
         const hsep_int place = linearised_of_command[i];

@@ -1,10 +1,16 @@
 #include "hsep_splines.h"
 
 #include "hsep_math.h"
+#include "hsep_vector.h"
 
 #include <string.h>
 
-/* Differences of an order that one spline has; the first of them is 0. */
+/* The differences of an order of one spline, in shares, (4 spacing + order,); the first one is 0. */
+static const hsep_real *splines_differences(const hsep_splines *self, unsigned order)
+{
+    return hsep_at_const(self, self->differences[order]);
+}
+
 static hsep_int splines_length(const hsep_splines *self, unsigned order) { return 4 * self->spacing + order; }
 
 HSEP_API hsep_real hsep_splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int spacing)
@@ -176,7 +182,7 @@ static void splines_products(
     const hsep_int spacing = self->spacing;
     hsep_lanes s0 = {0.0}, s1 = s0, s2 = s0, s3 = s0; /* each has a name, and so a register */
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        const hsep_real *e = hsep_at_const(self, self->differences[order]);
+        const hsep_real *e = splines_differences(self, order);
         const hsep_int length = splines_length(self, order);
         hsep_int begin = order * self->preview; /* of a phase */
         for (hsep_int phase = 0; phase < spacing; phase++) {
@@ -224,7 +230,7 @@ HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self)
 {
     hsep_real sum = 0.0;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        const hsep_real *e = hsep_at_const(self, self->differences[order]);
+        const hsep_real *e = splines_differences(self, order);
         sum += hsep_dot(e, e, splines_length(self, order));
     }
     return sum;
@@ -256,7 +262,7 @@ HSEP_API void hsep_splines_add_jerk(
     const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real triangle[],
     hsep_real v[])
 {
-    const hsep_real *e = hsep_at_const(self, self->differences[3]);
+    const hsep_real *e = splines_differences(self, 3);
     const hsep_int n = self->n - first, length = splines_length(self, 3);
     const hsep_real unit = 1.0 / self->share[3], of_third = weight / self->share[3];
     for (hsep_int d = 0; triangle != NULL && d < n && d * self->spacing + 1 < length; d++) {

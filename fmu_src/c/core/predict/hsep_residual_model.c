@@ -93,6 +93,16 @@ HSEP_API hsep_real hsep_residual_factor(hsep_residual_model *self, hsep_int fact
     return hsep_warm_start_n_rows(evidence);
 }
 
+HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self)
+{
+    return self->averaged ? HSEP_LEARNED_WORDS + hsep_residual_averaged(self)->n_static : 0;
+}
+
+HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self)
+{
+    return self->averaged ? &hsep_residual_averaged(self)->learned.velocity_scale : NULL;
+}
+
 HSEP_API void hsep_residual_restart(hsep_residual_model *self)
 {
     if (self->averaged) {

@@ -54,14 +54,8 @@ HSEP_API void hsep_residual_load(hsep_residual_model *self, hsep_int factor, hse
 HSEP_API hsep_real hsep_residual_factor(hsep_residual_model *self, hsep_int factor, hsep_real triangle[]);
 
 /* Numbers learned besides them, the first of so many; none without averaging. */
-static inline hsep_int hsep_residual_n_learned(hsep_residual_model *self)
-{
-    return self->averaged ? HSEP_LEARNED_WORDS + hsep_residual_averaged(self)->n_static : 0;
-}
-static inline hsep_real *hsep_residual_learned(hsep_residual_model *self)
-{
-    return self->averaged ? &hsep_residual_averaged(self)->learned.velocity_scale : NULL;
-}
+HSEP_API hsep_int hsep_residual_n_learned(hsep_residual_model *self);
+HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
 
 /* Begin a run with what an earlier one has learned, once it is loaded into a fresh block. */
 HSEP_API void hsep_residual_restart(hsep_residual_model *self);
