@@ -99,7 +99,9 @@ VARIANTS: Mapping[str, Changes] = {
     "features never begin anew": constants(velocity_jump=1e300),
     "rows are independent": constants(correlation_max=1.0),
     "no recall": {
-        AVERAGING + "hsep_recall.c": [("    if (self->size <= n) {", "    if (self->size <= n + self->size) {")]
+        AVERAGING + "hsep_recall.c": [
+            ("    if (self->size <= self->n) {", "    if (self->size <= self->n + self->size) {")
+        ]
     },
     "no first differences of disturbances": constants(difference_share=1e-6),
     "first differences as large": constants(difference_share=1.0),
