@@ -217,6 +217,7 @@ class Tracking:
     def lines(self, shown: DisplayUnits) -> list[str]:
         """Return the errors in words, what binds them and, last, how they came about."""
         change_max = "none" if self.change_max is None else shown.words(self.change_max, ".4g")
+        monitored = shown.words(self.following_error_max, ".4g") if self.following_error_max > 0.0 else ""
         lines = [
             f"Tracking error (commanded minus measured, RMS) over {self.duration:.3g} s of the log: "
             f"{_words(self.none, shown)} as recorded; with the compensator about {_words(self.hybrid, shown)} by the "
@@ -228,9 +229,9 @@ class Tracking:
         ]
         if self.change_max is not None:
             lines[-1] += (
-                " For a program whose largest servo error is above the log's, set change_max to twice that error and "
-                f"following_error_max to {_FOLLOWING_ERROR:g} times that error; motion more than 1.25 times as fast as "
-                "all that was learned may use half of change_max at first."
+                " For a program whose largest servo error is above the log's, set change_max to twice that error"
+                + (f" and following_error_max to {_FOLLOWING_ERROR:g} times that error" if monitored else "")
+                + "; motion more than 1.25 times as fast as all that was learned may use half of change_max at first."
             )
         if self.change_max is not None and self.change_max < self.largest:
             left = shown.words(self.largest - self.change_max, ".4g")
@@ -249,9 +250,10 @@ class Tracking:
             *lines,
             *(self.costs.lines(shown) if self.costs is not None else ()),
             *(self.look_aheads.lines() if self.look_aheads is not None else ()),
-            "Where the measured following error is above following_error_max = "
-            f"{shown.words(self.following_error_max, '.4g')} for three samples in a row, the compensator trips: its "
-            "change of the command fades until reset.",
+            f"Where the measured following error is above following_error_max = {monitored} for three samples in a "
+            "row, the compensator trips: its change of the command fades until reset."
+            if monitored
+            else "following_error_max is 0: nothing trips.",
             _HOW,
         ]
 

@@ -142,6 +142,8 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     beyond = f"{0.5e6 * change_max:.4g} µm of it cannot be compensated."
     assert f"The largest servo error of the log, {1.5e6 * change_max:.4g} µm, is above change_max: {beyond}" in said
     assert "The log's commands reach 500 mm/s, above v_max = 300 mm/s: where they do, it bounds" in said
+    assert "set change_max to twice that error; motion" in said
+    assert "following_error_max is 0: nothing trips." in said
 
 
 @pytest.mark.skipif(not LOOPS.is_dir(), reason=f"the cases are not at {LOOPS}")
