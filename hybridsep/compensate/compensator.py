@@ -124,9 +124,9 @@ class SepCompensator:
         """Change settings in a run, from the next window on; no command jumps.
 
         Every plan goes on from the remainder of the last plan, which keeps the drive's limits and ends at ``x_d``. With
-        ``compensate="off"`` a plan ends compensation, where ``averaging`` is on, smoothly and within the preview; else
-        the command follows that remainder. Where it is larger than a new ``change_max``, it is the bound.
-        ``following_error_max`` counts from the next sample on; 0 ends no trip.
+        ``compensate="off"`` a plan ends compensation, smoothly and within the preview. Where the remainder is larger
+        than a new ``change_max``, it is the bound. ``following_error_max`` counts from the next sample on; 0 ends no
+        trip.
 
         Parameters
         ----------

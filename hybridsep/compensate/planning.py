@@ -25,6 +25,10 @@ from .newton import PHYSICS_STEPS, TOLERANCE, AveragedPlanner, PlanModel, is_bet
 from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve
 from .splines import N_DECIDED, SplineBasis
 
+_ENDS, _NEW = 5.0, 1e9
+"""Periods in a plan of the change whose jerk weighs as much as the change itself in a plan that ends compensation; and
+the factor of what it may be behind the last plan, so that it is nothing there and ends as soon as the remainder."""
+
 
 @dataclass(frozen=True)
 class PendingPlan:
@@ -133,6 +137,25 @@ class Planning(ABC):
         found = solve(cost, bounds, previous_plan[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
         return None if found is None else np.concatenate((decided, found.x))
 
+    def ending(self, preview: Preview, tolerance: Tolerance = EXACT) -> Array:
+        """Return the coefficients, ``(3 + n_free,)``, m, of a plan that ends compensation, smoothly and soon.
+
+        It has the least change of the command that its jerk and the drive's limits allow, and ends where the last plan
+        does; where there is none, the remainder of that goes on.
+        """
+        decided, last = np.split(preview.previous_plan, [N_DECIDED])
+        at_once, nothing = np.eye(1, self.horizon)[0], np.zeros(self.horizon)
+        jerk_weight = (2.0 * math.sin(math.pi * _ENDS / self.horizon)) ** -6.0
+        cost = self.basis.cost(at_once, nothing, nothing, decided, preview.delta_before, jerk_weight)
+        new = np.arange(len(last) - self.Np // self.spacing, len(last))
+        cost.P[new, new] *= _NEW
+        found = solve(cost, self.limits(preview), last, self.n_pinned, always=True, tolerance=tolerance)
+        return preview.previous_plan if found is None else np.concatenate((decided, found.x))
+
+    def ended(self, preview: Preview, tolerance: Tolerance = EXACT) -> Array:
+        """Return :meth:`ending` in the first window without a model, and then its remainder."""
+        return preview.previous_plan if preview.state_before is SepState.OFF else self.ending(preview, tolerance)
+
     def limits(self, preview: Preview, *, may_turn: bool = False, change: float = 1.0) -> Bounds:
         """Return the drive's limits on the coefficients of a plan, and a share of the largest change."""
         before = preview.x_d_before, preview.delta_before, preview.previous_plan
@@ -153,7 +176,7 @@ class PaperPlanning(Planning):
         """Return the plan of the best model that has one, else the remainder of the last plan."""
         candidates = self._candidates(predictor, most)
         if not candidates:
-            return ChosenPlan(SepState.OFF, preview.previous_plan, None)
+            return ChosenPlan(SepState.OFF, self.ended(preview), None)
         bounds = self.limits(preview)
         with np.errstate(all="ignore"):  # a hybrid model that is no candidate may be unstable
             operator = predictor.operator(self.horizon)  # Eq. (3)
@@ -220,10 +243,6 @@ this share of ``change_max`` only. ``change_max`` is to be twice the largest err
 error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
 may change it by all of ``change_max`` where weights of earlier runs judge it."""
 
-_ENDS, _NEW = 5.0, 1e9
-"""Periods in a plan of the change whose jerk weighs as much as the change itself in a plan that ends compensation; and
-the factor of what it may be behind the last plan, so that it is nothing there and ends as soon as the remainder."""
-
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
 model."""
@@ -261,8 +280,7 @@ class AveragedPlanning(Planning):
         model = self._model(predictor, path, preview)
         previous_plan, scales = preview.previous_plan, model.scales
         if most is SepState.OFF:
-            ended = previous_plan if preview.state_before is SepState.OFF else self.ending(preview)
-            return ChosenPlan(SepState.OFF, ended, scales)
+            return ChosenPlan(SepState.OFF, self.ended(preview, TOLERANCE), scales)
         g, free = predictor.physics_operator(self.horizon)
         change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
         of_physics_change = 1.0 if model.is_trained else change
@@ -278,7 +296,7 @@ class AveragedPlanning(Planning):
         with np.errstate(all="ignore"):
             planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
             ends = bool(self.paused) and most is SepState.HYBRID
-            last = planner.point(self.ending(preview)) if ends else planner.previous(previous_plan)
+            last = planner.point(self.ending(preview, TOLERANCE)) if ends else planner.previous(previous_plan)
             of_physics, is_away = planner.point(physics), False
             if follows:
                 bounds = self.limits(preview, may_turn=True, change=change)
@@ -292,22 +310,6 @@ class AveragedPlanning(Planning):
             if is_better(last.cost, of_physics.cost):
                 return ChosenPlan(SepState.OFF, last.coefficients, scales, is_away)
         return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)
-
-    def ending(self, preview: Preview) -> Array:
-        """Return the coefficients, ``(3 + n_free,)``, m, of a plan that ends compensation, smoothly and soon.
-
-        It has the least change of the command that its jerk and the drive's limits allow, and ends where the last plan
-        does; where there is none, the remainder of that goes on.
-        """
-        decided, last = np.split(preview.previous_plan, [N_DECIDED])
-        at_once, nothing = np.eye(1, self.horizon)[0], np.zeros(self.horizon)
-        jerk_weight = (2.0 * math.sin(math.pi * _ENDS / self.horizon)) ** -6.0
-        cost = self.basis.cost(at_once, nothing, nothing, decided, preview.delta_before, jerk_weight)
-        cost.P[np.diag_indices(len(last))] *= np.where(
-            np.arange(len(last)) < len(last) - self.Np // self.spacing, 1.0, _NEW
-        )
-        found = solve(cost, self.limits(preview), last, self.n_pinned, always=True, tolerance=TOLERANCE)
-        return preview.previous_plan if found is None else np.concatenate((decided, found.x))
 
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
         """Return the model's position wherever it may plan.

@@ -176,8 +176,11 @@ def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pyt
 
 
 @pytest.mark.parametrize("limits", [DRIVE_LIMITS, None], ids=["limits", "none"])
-def test_compensation_ends_by_the_least_change_that_its_jerk_allows(limits: Limits | None) -> None:
-    sep = compensator(limits=limits, averaging=True, Np=20, p=5)
+@pytest.mark.parametrize(("averaging", "n_pinned"), [(True, 5), (False, 4)])
+def test_compensation_ends_by_the_least_change_that_its_jerk_allows(
+    limits: Limits | None, averaging: bool, n_pinned: int
+) -> None:
+    sep = compensator(limits=limits, averaging=averaging, Np=20, p=5)
     for _ in range(2):  # of a command that moves away
         sep.plan(move(240)[20:220])
         sep.update(np.zeros(20))
@@ -185,7 +188,11 @@ def test_compensation_ends_by_the_least_change_that_its_jerk_allows(limits: Limi
     sep.change(compensate="off", change_max=None)
     sep.plan(np.zeros(200))
     assert sep._pending is not None
-    found, n, new = sep._pending.coefficients, 3 + 5, 10  # splines that are decided or pinned; behind the last plan
+    found, n, new = (
+        sep._pending.coefficients,
+        3 + n_pinned,
+        10,
+    )  # splines that are decided or pinned; behind the last plan
     third = np.diff(np.concatenate((np.zeros((3, basis.values.shape[1])), basis.values)), 3, axis=0)
     before = np.diff(np.concatenate((sep._delta_before, np.zeros(200))), 3)
     weight = (2.0 * np.sin(np.pi * 5.0 / 200)) ** -3.0

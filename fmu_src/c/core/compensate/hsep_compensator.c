@@ -239,14 +239,15 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     return status;
 }
 
-/* Begin a plan on the paper's model, or on the physics model where the paper's must not plan; return whether it is left
- * to solve. */
+/* Begin a plan on the paper's model, or on the physics model where the paper's must not plan, or one that ends
+ * compensation; return whether it is left to solve. */
 static int compensator_plan(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     hsep_paper *paper = hsep_residual_paper(hsep_predictor_model(predictor));
     const hsep_recursion recursion = hsep_paper_recursion(paper, 0);
     hsep_plan_status status = HSEP_PLAN_FAILED;
+    const hsep_int before = self->state;
     self->state = HSEP_SEP_OFF;
     if (self->compensate == HSEP_SEP_HYBRID && (hsep_real)predictor->k >= predictor->n_init &&
         hsep_paper_regression(paper)->n_rows > 0.0 &&
@@ -255,6 +256,11 @@ static int compensator_plan(hsep_compensator *self)
     }
     if (status == HSEP_PLAN_FAILED && self->compensate != HSEP_SEP_OFF) {
         status = compensator_try(self, HSEP_SEP_PHYSICS);
+    } else if (self->compensate == HSEP_SEP_OFF && before != HSEP_SEP_OFF) {
+        hsep_planner *planner = hsep_compensator_planner(self);
+        hsep_planner_end(planner, hsep_at(predictor, predictor->x_d));
+        status =
+            hsep_planner_factor(planner, 1) ? hsep_planner_solve(planner, 1, &compensator_exact) : HSEP_PLAN_FAILED;
     }
     predictor->n_physics = self->state == HSEP_SEP_HYBRID ? 0 : predictor->Np;
     return status == HSEP_PLAN_BOUNDED;
