@@ -159,8 +159,8 @@ hsep_compensator_weights(hsep_compensator *self, const hsep_parameters *paramete
 /* Other settings from the next window on; no command jumps. compensate: the best model allowed; change_max, m, > 0;
  * following_error_max, m, which counts from the next sample on, 0: none. Every plan goes on from the remainder of the
  * last plan, which keeps the drive's limits and ends at x_d. With compensate off a plan ends compensation, within them.
- * Where the remainder is larger than change_max, it is the bound. Return whether they were taken: not, with nothing changed, where
- * one is out of its range. */
+ * Where the remainder is larger than change_max, it is the bound. Return whether they were taken: not, with nothing
+ * changed, where one is out of its range. */
 HSEP_API int hsep_compensator_change(
     hsep_compensator *self, hsep_sep_state compensate, hsep_real change_max, hsep_real following_error_max);
 
