@@ -83,6 +83,7 @@ class Planning(ABC):
 
     PINNED: ClassVar[int]  # leading samples of a window in which a plan follows the last one
     ALWAYS: ClassVar[bool]  # whether every plan follows it there; else only plans that the drive's limits bound
+    SOLVED: ClassVar[Tolerance]  # to which programmes are solved
     paused: int  # windows that the residual model does not plan now
     pause: int  # and after its next plan that runs away
 
@@ -137,7 +138,7 @@ class Planning(ABC):
         found = solve(cost, bounds, previous_plan[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
         return None if found is None else np.concatenate((decided, found.x))
 
-    def ending(self, preview: Preview, tolerance: Tolerance = EXACT) -> Array:
+    def ending(self, preview: Preview) -> Array:
         """Return the coefficients, ``(3 + n_free,)``, m, of a plan that ends compensation, smoothly and soon.
 
         It has the least change of the command that its jerk and the drive's limits allow, and ends where the last plan
@@ -149,12 +150,12 @@ class Planning(ABC):
         cost = self.basis.cost(at_once, nothing, nothing, decided, preview.delta_before, jerk_weight)
         new = np.arange(len(last) - self.Np // self.spacing, len(last))
         cost.P[new, new] *= _NEW
-        found = solve(cost, self.limits(preview), last, self.n_pinned, always=True, tolerance=tolerance)
+        found = solve(cost, self.limits(preview), last, self.n_pinned, always=True, tolerance=self.SOLVED)
         return preview.previous_plan if found is None else np.concatenate((decided, found.x))
 
-    def ended(self, preview: Preview, tolerance: Tolerance = EXACT) -> Array:
-        """Return :meth:`ending` in the first window without a model, and then its remainder."""
-        return preview.previous_plan if preview.state_before is SepState.OFF else self.ending(preview, tolerance)
+    def without_model(self, preview: Preview) -> Array:
+        """Return the coefficients where no model may plan: of :meth:`ending` at first, then of its remainder."""
+        return preview.previous_plan if preview.state_before is SepState.OFF else self.ending(preview)
 
     def limits(self, preview: Preview, *, may_turn: bool = False, change: float = 1.0) -> Bounds:
         """Return the drive's limits on the coefficients of a plan, and a share of the largest change."""
@@ -171,12 +172,13 @@ class PaperPlanning(Planning):
 
     PINNED: ClassVar[int] = _PINNED_PAPER
     ALWAYS: ClassVar[bool] = False
+    SOLVED: ClassVar[Tolerance] = EXACT
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
-        """Return the plan of the best model that has one, else the remainder of the last plan."""
+        """Return the plan of the best model that has one, else one without a model."""
         candidates = self._candidates(predictor, most)
         if not candidates:
-            return ChosenPlan(SepState.OFF, self.ended(preview), None)
+            return ChosenPlan(SepState.OFF, self.without_model(preview), None)
         bounds = self.limits(preview)
         with np.errstate(all="ignore"):  # a hybrid model that is no candidate may be unstable
             operator = predictor.operator(self.horizon)  # Eq. (3)
@@ -237,7 +239,7 @@ RETRY = 0.5
 """Time for which the averaged model plans nothing after the first of its plans that ran away, s; twice as long after
 each further one of a run."""
 
-_FASTER, _UNPROVEN = 1.25, 0.5
+FASTER, _UNPROVEN = 1.25, 0.5
 """Speed of the preview, relative to the fastest motion that was learned, above which plans may change the command by
 this share of ``change_max`` only. ``change_max`` is to be twice the largest error without compensation, so this is that
 error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
@@ -268,6 +270,7 @@ class AveragedPlanning(Planning):
 
     PINNED: ClassVar[int] = _PINNED_AVERAGED
     ALWAYS: ClassVar[bool] = True
+    SOLVED: ClassVar[Tolerance] = TOLERANCE
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         super().__init__(basis, bounds, settings, Np)
@@ -280,9 +283,9 @@ class AveragedPlanning(Planning):
         model = self._model(predictor, path, preview)
         previous_plan, scales = preview.previous_plan, model.scales
         if most is SepState.OFF:
-            return ChosenPlan(SepState.OFF, self.ended(preview, TOLERANCE), scales)
+            return ChosenPlan(SepState.OFF, self.without_model(preview), scales)
         g, free = predictor.physics_operator(self.horizon)
-        change = _UNPROVEN if model.outgrows(_FASTER) else 1.0
+        change = _UNPROVEN if model.outgrows(FASTER) else 1.0
         of_physics_change = 1.0 if model.is_trained else change
         has_learned = predictor.k >= predictor.n_init and model.has_learned
         follows = has_learned and most is SepState.HYBRID and not self.paused
@@ -296,7 +299,7 @@ class AveragedPlanning(Planning):
         with np.errstate(all="ignore"):
             planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
             ends = bool(self.paused) and most is SepState.HYBRID
-            last = planner.point(self.ending(preview, TOLERANCE)) if ends else planner.previous(previous_plan)
+            last = planner.point(self.ending(preview)) if ends else planner.previous(previous_plan)
             of_physics, is_away = planner.point(physics), False
             if follows:
                 bounds = self.limits(preview, may_turn=True, change=change)

@@ -12,6 +12,7 @@ from ..base.metrics import ErrorSize, peak_derivatives, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, CompensatorSettings, Limits
 from ..base.signals import Array
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
+from ..compensate.planning import FASTER
 from ..cosim.inverse import FirInverse
 from ..identify.output_error import in_time
 from ..logs.units import DisplayUnits
@@ -231,7 +232,8 @@ class Tracking:
             lines[-1] += (
                 " For a program whose largest servo error is above the log's, set change_max to twice that error"
                 + (f" and following_error_max to {_FOLLOWING_ERROR:g} times that error" if monitored else "")
-                + "; motion more than 1.25 times as fast as all that was learned may use half of change_max at first."
+                + f"; motion more than {FASTER:g} times as fast as all that was learned may use half of change_max at "
+                "first."
             )
         if self.change_max is not None and self.change_max < self.largest:
             left = shown.words(self.largest - self.change_max, ".4g")

@@ -188,11 +188,8 @@ def test_compensation_ends_by_the_least_change_that_its_jerk_allows(
     sep.change(compensate="off", change_max=None)
     sep.plan(np.zeros(200))
     assert sep._pending is not None
-    found, n, new = (
-        sep._pending.coefficients,
-        3 + n_pinned,
-        10,
-    )  # splines that are decided or pinned; behind the last plan
+    found = sep._pending.coefficients
+    n, new = 3 + n_pinned, 10  # splines that are decided or pinned, and those behind the last plan
     third = np.diff(np.concatenate((np.zeros((3, basis.values.shape[1])), basis.values)), 3, axis=0)
     before = np.diff(np.concatenate((sep._delta_before, np.zeros(200))), 3)
     weight = (2.0 * np.sin(np.pi * 5.0 / 200)) ** -3.0

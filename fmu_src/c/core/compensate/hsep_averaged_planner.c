@@ -579,13 +579,11 @@ HSEP_API void hsep_averaged_planner_begin(
     hsep_averaged_forecast(
         task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
         hsep_at(self, self->e_h), self->samples);
-    self->ends = self->planned > 0; /* where no model may plan now */
+    const hsep_int was_planned = self->planned;
     self->planned = best > 0;
     self->judges = self->planned && warm && task->model->predicted[HSEP_STATIC];
     self->follows = self->judges && best > 1 && self->paused == 0;
-    if (best > 0) {
-        self->ends = self->judges && best > 1 && self->paused > 0;
-    }
+    self->ends = (best == 0 && was_planned > 0) || (self->judges && best > 1 && self->paused > 0);
     self->paused -= self->paused > 0;
     averaged_planner_go_on(self, task);
 }
