@@ -283,6 +283,7 @@ class PlannedPoint:
     """Plan with what the model predicts under it."""
 
     coefficients: Array  # (3 + n_free,), m
+    change: Array  # (m,), m: of the remainder of the last plan, by the splines that are solved for; 0 of any other plan
     prediction: AveragedForecast
     x_h: Array  # (preview,), m, relative to the start
     third: Array  # (preview,), m, third differences of δ
@@ -292,32 +293,45 @@ class PlannedPoint:
 class AveragedPlanner:
     """Plans of one window on the averaged model.
 
-    ``model``: of the plan that the window begins; ``x_d``: (preview,), m: commanded positions, relative to the start;
-    ``delta_before``: (3,), m: last three values of δ.
+    ``splines``: (n_free, m): those that are solved for, as sums of the free ones
+    (:func:`~hybridsep.compensate.splines.solved_splines`); ``model``: of the plan that the window begins; ``x_d``:
+    (preview,), m: commanded positions, relative to the start; ``delta_before``: (3,), m: last three values of δ.
     """
 
     def __init__(
-        self, basis: SplineBasis, jerk_weight: float, model: PlanModel, x_d: Array, delta_before: Array
+        self,
+        basis: SplineBasis,
+        splines: Array,
+        jerk_weight: float,
+        model: PlanModel,
+        x_d: Array,
+        delta_before: Array,
     ) -> None:
-        self._basis, self._jerk_weight, self._model, self._x_d = basis, jerk_weight, model, x_d
+        self._basis, self._splines, self._jerk_weight, self._model = basis, splines, jerk_weight, model
+        self._x_d, self._unchanged = x_d, np.zeros(splines.shape[1])
         self._third_before = np.diff(np.concatenate((delta_before, np.zeros(basis.preview))), 3)
 
-    def point(self, coefficients: Array) -> PlannedPoint:
+    def point(self, coefficients: Array, change: Array | None = None) -> PlannedPoint:
         """Return a plan with its cost, which is not finite if its prediction overflows."""
-        return self._point(coefficients, self._model.predict(self._x_d + self._basis.delta(coefficients)))
+        prediction = self._model.predict(self._x_d + self._basis.delta(coefficients))
+        return self._point(coefficients, self._unchanged if change is None else change, prediction)
 
     def previous(self, previous_plan: Array) -> PlannedPoint:
         """Return the remainder of the last plan."""
-        return self._point(previous_plan, self._model.of_previous_plan)
+        return self._point(previous_plan, self._unchanged, self._model.of_previous_plan)
 
     def plan(
-        self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_pinned: int, passed: Array
+        self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_followed: int, passed: Array
     ) -> PlannedPoint:
-        """Return the plan behind Newton steps, as long as they lower the cost; parameters as of :meth:`step`."""
-        n = max(1, n_pinned * self._basis.spacing // _STEP)
+        """Return the plan behind Newton steps, as long as they lower the cost.
+
+        ``n_followed``: leading samples that the plan leaves as they are; other parameters as of :meth:`step`.
+        """
+        n = max(1, n_followed // _STEP)
+        bounds = bounds.of_change(previous_plan[N_DECIDED:], self._splines)
         for i, reach in enumerate(_REACHES[1:2] if n == 1 else _REACHES[:n]):
             tolerance = TOLERANCE._replace(steps=_FIRST_STEPS) if i == 0 and n > 1 else TOLERANCE
-            before, start = start, self.step(start, previous_plan, bounds, n_pinned, passed, reach, tolerance)
+            before, start = start, self.step(start, previous_plan, bounds, passed, reach, tolerance)
             if start is before:
                 break
         return start
@@ -327,7 +341,6 @@ class AveragedPlanner:
         start: PlannedPoint,
         previous_plan: Array,
         bounds: Bounds,
-        n_pinned: int,
         passed: Array,
         reach: float,
         tolerance: Tolerance = TOLERANCE,
@@ -335,26 +348,31 @@ class AveragedPlanner:
         """Return the plan behind a Newton step; the start itself, if none is better.
 
         ``start``: where the model is linearised; ``previous_plan``: (3 + n_free,), m: coefficients of the remainder
-        of the last plan, the decided ones first; they are feasible; ``n_pinned``: coefficients that the plan does not
-        change; ``passed``: (preview, n_free): free splines filtered by ``G_pb``; ``reach``: of friction's slope, as
-        of :meth:`PlanModel.slope`; ``tolerance``: of the solver.
+        of the last plan, the decided ones first; ``bounds``: on its change; ``passed``: (preview, n_free): free splines
+        filtered by ``G_pb``; ``reach``: of friction's slope, as of :meth:`PlanModel.slope`; ``tolerance``: of the
+        solver.
         """
-        splines, third = self._basis.values[:, N_DECIDED:], self._basis.third[:, N_DECIDED:]
-        decided, at = np.split(start.coefficients, [N_DECIDED])
-        W = self._basis.weight[:, None] * self._model.slope(start.prediction, splines, passed, reach)
+        splines = self._basis.values[:, N_DECIDED:] @ self._splines
+        third = self._basis.third[:, N_DECIDED:] @ self._splines
+        slope = self._model.slope(start.prediction, splines, passed @ self._splines, reach)
+        W, at = self._basis.weight[:, None] * slope, start.change
         P = W.T @ W + self._jerk_weight * (third.T @ third)
         target = self._basis.weight * (self._x_d - start.x_h) + W @ at
         v = W.T @ target - self._jerk_weight * (third.T @ (start.third - third @ at))
-        cost = PlanCost.regular(P, v, n_pinned)
-        found = solve(cost, bounds, previous_plan[N_DECIDED:], n_pinned, always=True, tolerance=tolerance)
+        found = solve(PlanCost(P, v).regular(), bounds, self._unchanged, 0, tolerance=tolerance)
         if found is None:
             return start
-        ends = (np.concatenate((decided, at + length * (found.x - at))) for length in _LENGTHS)
-        return next((end for end in map(self.point, ends) if is_better(end.cost, start.cost)), start)
+        decided, last = np.split(previous_plan, [N_DECIDED])
+        for length in _LENGTHS:
+            change = at + length * (found.x - at)
+            end = self.point(np.concatenate((decided, last + self._splines @ change)), change)
+            if is_better(end.cost, start.cost):
+                return end
+        return start
 
-    def _point(self, coefficients: Array, prediction: AveragedForecast) -> PlannedPoint:
+    def _point(self, coefficients: Array, change: Array, prediction: AveragedForecast) -> PlannedPoint:
         third = self._basis.third @ coefficients + self._third_before
         x_h = self._model.position(prediction)
         error = self._basis.weight * (self._x_d - x_h)
         cost = float(error @ error) + self._jerk_weight * float(third @ third)
-        return PlannedPoint(coefficients, prediction, x_h, third, cost)
+        return PlannedPoint(coefficients, change, prediction, x_h, third, cost)

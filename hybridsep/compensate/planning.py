@@ -22,8 +22,8 @@ from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
 from .newton import PHYSICS_STEPS, TOLERANCE, AveragedPlanner, PlanModel, is_better
-from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve
-from .splines import N_DECIDED, SplineBasis
+from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve, solve_change
+from .splines import N_DECIDED, SplineBasis, solved_splines
 
 _ENDS, _NEW = 5.0, 1e9
 """Periods in a plan of the change whose jerk weighs as much as the change itself in a plan that ends compensation; and
@@ -81,8 +81,7 @@ class Planning(ABC):
     ``settings``: of the window: ``preview`` and ``spacing`` are given.
     """
 
-    PINNED: ClassVar[int]  # leading samples of a window in which a plan follows the last one
-    ALWAYS: ClassVar[bool]  # whether every plan follows it there; else only plans that the drive's limits bound
+    PINNED: ClassVar[int]  # leading samples of a window in which a plan follows the last one, if limits bound it
     SOLVED: ClassVar[Tolerance]  # to which programmes are solved
     paused: int  # windows that the residual model does not plan now
     pause: int  # and after its next plan that runs away
@@ -95,6 +94,8 @@ class Planning(ABC):
         self.Np = Np
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
         self.weight: Array | None = None  # (horizon,): of the errors of a plan; without it all count alike
+        # (n_free, m): splines that a plan changes the last one by, none of them pinned; without it all at once
+        self.splines: Array | None = None
 
     def restart(self, T_s: float) -> None:
         """Begin another run, with a sampling interval in s: nothing is paused."""
@@ -135,8 +136,12 @@ class Planning(ABC):
         decided, jerk_weight = previous_plan[:N_DECIDED], self.settings.jerk_weight
         free = free + np.asarray(lfilter(g, [1.0], preview.load))
         cost = self.basis.cost(g, free, x_d, decided, preview.delta_before, jerk_weight, self.weight)
-        found = solve(cost, bounds, previous_plan[N_DECIDED:], self.n_pinned, always=self.ALWAYS, tolerance=tolerance)
-        return None if found is None else np.concatenate((decided, found.x))
+        last = previous_plan[N_DECIDED:]
+        if self.splines is not None:
+            cost = cost.of_change(last, self.splines).regular()
+            return _after(decided, solve_change(cost, bounds, last, self.splines, tolerance))
+        found = solve(cost.regular(), bounds, last, self.n_pinned, tolerance=tolerance)
+        return _after(decided, None if found is None else found.x)
 
     def ending(self, preview: Preview) -> Array:
         """Return the coefficients, ``(3 + n_free,)``, m, of a plan that ends compensation, smoothly and soon.
@@ -147,11 +152,13 @@ class Planning(ABC):
         decided, last = np.split(preview.previous_plan, [N_DECIDED])
         at_once, nothing = np.eye(1, self.horizon)[0], np.zeros(self.horizon)
         jerk_weight = (2.0 * math.sin(math.pi * _ENDS / self.horizon)) ** -6.0
+        not_pinned = np.eye(len(last))[:, self.n_pinned :]
         cost = self.basis.cost(at_once, nothing, nothing, decided, preview.delta_before, jerk_weight)
-        new = np.arange(len(last) - self.Np // self.spacing, len(last))
+        cost = cost.of_change(last, not_pinned).regular()
+        new = np.arange(len(cost.v))[-(self.Np // self.spacing) :]
         cost.P[new, new] *= _NEW
-        found = solve(cost, self.limits(preview), last, self.n_pinned, always=True, tolerance=self.SOLVED)
-        return preview.previous_plan if found is None else np.concatenate((decided, found.x))
+        found = _after(decided, solve_change(cost, self.limits(preview), last, not_pinned, self.SOLVED))
+        return preview.previous_plan if found is None else found
 
     def without_model(self, preview: Preview) -> Array:
         """Return the coefficients where no model may plan: of :meth:`ending` at first, then of its remainder."""
@@ -163,6 +170,10 @@ class Planning(ABC):
         return self.bounds.bounds(preview.command, *before, may_turn=may_turn, change=change)
 
 
+def _after(decided: Array, free: Array | None) -> Array | None:
+    return None if free is None else np.concatenate((decided, free))
+
+
 _PINNED_PAPER = 8
 """Leading samples of a window in which a bounded plan follows the last one: real-time solvers take 3 steps in each."""
 
@@ -171,7 +182,6 @@ class PaperPlanning(Planning):
     """Plans with the paper's model."""
 
     PINNED: ClassVar[int] = _PINNED_PAPER
-    ALWAYS: ClassVar[bool] = False
     SOLVED: ClassVar[Tolerance] = EXACT
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
@@ -269,12 +279,13 @@ class AveragedPlanning(Planning):
     """Plans with the averaged model, which watches itself."""
 
     PINNED: ClassVar[int] = _PINNED_AVERAGED
-    ALWAYS: ClassVar[bool] = True
     SOLVED: ClassVar[Tolerance] = TOLERANCE
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         super().__init__(basis, bounds, settings, Np)
         self.weight = basis.weight
+        free = solved_splines(basis.n_free - self.n_pinned, Np // self.spacing)
+        self.splines = np.concatenate((np.zeros((self.n_pinned, free.shape[1])), free))
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the allowed plan that the averaged model judges best; before it has learned, the physics model's."""
@@ -297,13 +308,17 @@ class AveragedPlanning(Planning):
         if not has_learned:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
-            planner = AveragedPlanner(self.basis, self.settings.jerk_weight, model, path, preview.delta_before)
+            assert self.splines is not None
+            planner = AveragedPlanner(
+                self.basis, self.splines, self.settings.jerk_weight, model, path, preview.delta_before
+            )
             ends = bool(self.paused) and most is SepState.HYBRID
             last = planner.point(self.ending(preview)) if ends else planner.previous(previous_plan)
             of_physics, is_away = planner.point(physics), False
             if follows:
                 bounds = self.limits(preview, may_turn=True, change=change)
-                hybrid = planner.plan(last, previous_plan, bounds, self.n_pinned, self.basis.filtered(g))
+                n_followed = self.n_pinned * self.spacing
+                hybrid = planner.plan(last, previous_plan, bounds, n_followed, self.basis.filtered(g))
                 if is_better(hybrid.cost, of_physics.cost):
                     values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.horizon)
                     deltas = values @ hybrid.coefficients, values @ physics

@@ -164,6 +164,11 @@ class Bounds:
         values = self.rows @ c
         return bool(np.all(values >= self.low) and np.all(values <= self.high))
 
+    def of_change(self, plan: Array, splines: Array) -> "Bounds":
+        """Return the constraints on a change of a feasible ``plan``, ``(n,)``, m, by sums of splines, ``(n, m)``."""
+        here = self.rows @ plan
+        return Bounds(self.rows @ splines, self.low - here, self.high - here)
+
     def step(self, start: Array, c: Array) -> float:
         """Return the largest feasible step length, 0 … 1, from feasible coefficients ``start`` towards ``c``."""
         here, step = self.rows @ start, self.rows @ (c - start)
@@ -271,13 +276,7 @@ class DriveBounds:
 
 
 def solve(
-    cost: PlanCost,
-    bounds: Bounds,
-    previous_plan: Array,
-    n_pinned: int,
-    *,
-    always: bool = False,
-    tolerance: Tolerance = EXACT,
+    cost: PlanCost, bounds: Bounds, previous_plan: Array, n_pinned: int, *, tolerance: Tolerance = EXACT
 ) -> Minimum | None:
     """Return the minimiser of the cost within the bounds.
 
@@ -285,33 +284,32 @@ def solve(
     ``previous_plan``: a real-time implementation solves for the others while the pinned ones act.
 
     ``previous_plan``: (n,), m: feasible coefficients; ``n_pinned``: coefficients that a bounded plan does not change,
-    < n; ``always``: whether no plan changes them; ``tolerance``: of the interior-point solver, where the bounds are
-    active. Returns Minimum or None: ``(n,)``, m; None if there is no finite minimiser.
+    < n; ``tolerance``: of the interior-point solver, where the bounds are active. Returns Minimum or None: ``(n,)``, m;
+    None if there is no finite minimiser.
     """
-    n_kept = n_pinned if always else 0
-    c = _unbounded(cost, previous_plan, n_kept)
-    if c is None:
+    try:
+        c = np.asarray(cho_solve(cho_factor(cost.P), cost.v))
+    except (LinAlgError, ValueError):
+        return None
+    if not np.isfinite(c).all():
         return None
     if bounds.allow(c):
         return Minimum(c, 0)
-    scale = _cost_scale(cost, c, previous_plan, n_kept)
+    scale = float(cost.v @ c + previous_plan @ cost.P @ previous_plan)
     return _bounded(cost, bounds, previous_plan, n_pinned, scale, tolerance)
 
 
-def _unbounded(cost: PlanCost, previous_plan: Array, n_pinned: int) -> Array | None:
-    """Return the minimiser of the cost, ``(n,)``, m, the first ``n_pinned`` coefficients those of ``previous_plan``."""
-    left = cost.without(previous_plan[:n_pinned])
-    try:
-        c = np.asarray(cho_solve(cho_factor(left.P), left.v))
-    except (LinAlgError, ValueError):
-        return None
-    return np.concatenate((previous_plan[:n_pinned], c)) if np.isfinite(c).all() else None
+def solve_change(
+    cost: PlanCost, bounds: Bounds, previous_plan: Array, splines: Array, tolerance: Tolerance
+) -> Array | None:
+    """Return the plan of least cost within the bounds that changes ``previous_plan`` by sums of splines, ``(n, m)``.
 
-
-def _cost_scale(cost: PlanCost, c: Array, previous_plan: Array, n_pinned: int) -> float:
-    """Return the scale of the cost, m², between ``previous_plan`` and its minimiser of :func:`_unbounded`."""
-    left, at_rest = cost.without(previous_plan[:n_pinned]), previous_plan[n_pinned:]
-    return float(left.v @ c[n_pinned:] + at_rest @ left.P @ at_rest)
+    ``cost``: of the change; other parameters as of :func:`solve`. Returns the coefficients, ``(n,)``, m; None if there
+    is no finite minimiser.
+    """
+    of_change = bounds.of_change(previous_plan, splines)
+    found = solve(cost, of_change, np.zeros(splines.shape[1]), 0, tolerance=tolerance)
+    return None if found is None else np.asarray(previous_plan + splines @ found.x)
 
 
 def _bounded(
@@ -319,7 +317,7 @@ def _bounded(
 ) -> Minimum:
     """Return the minimiser of the cost within the bounds, as far as it is feasible from the last plan, and its steps.
 
-    Parameters are those of :func:`solve`; ``scale`` is :func:`_cost_scale`, m².
+    Parameters are those of :func:`solve`; ``scale``: of the cost, m², between ``previous_plan`` and its minimiser.
     """
     pinned, problem = previous_plan[:n_pinned], cost.without(previous_plan[:n_pinned])
     rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned

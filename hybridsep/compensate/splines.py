@@ -29,6 +29,28 @@ half plane grow from window to window where the preview is short."""
 _RIDGE = 1e-12
 """Added to the diagonal of a plan's cost, relative to its largest entry: rounding cannot leave it indefinite."""
 
+_TWO_SCALE = (0.125, 0.5, 0.75, 0.5, 0.125)
+"""A cubic B-spline as a sum of those with half its knot interval."""
+
+
+def solved_splines(n: int, window: int) -> Array:
+    """Return the splines that a plan of the averaged model is solved for, ``(n, m)``, as sums of ``n`` free ones.
+
+    Those of the first two windows, in which the plan acts or is pinned next, are free ones; behind them knots are
+    twice, and behind four windows four times as far apart. What is planned there is planned again, with closer knots,
+    before it acts, and goes on as it is until then: a plan changes the last one by these splines.
+
+    ``n``: splines that a plan may change; ``window``: splines that begin in a window.
+    """
+    columns, begin, sums, window = [], 0, np.ones(1), max(window, 4)
+    for apart, end in ((1, 2 * window), (2, 4 * window), (4, n)):
+        while begin < end and begin + len(sums) <= n:
+            columns.append(_padded(np.concatenate((np.zeros(begin), sums)), n))
+            begin += apart
+        begin -= 4 * apart  # the next ones overlap
+        sums = np.convolve(np.kron(sums, (1.0, 0.0))[: 2 * len(sums) - 1], _TWO_SCALE)
+    return np.column_stack(columns)
+
 
 @dataclass(frozen=True)
 class PlanCost:
@@ -37,14 +59,14 @@ class PlanCost:
     P: Array  # (n, n)
     v: Array  # (n,), m
 
-    @classmethod
-    def regular(cls, P: Array, v: Array, n_pinned: int = 0) -> "PlanCost":
-        """Return the cost with ``P``, which is changed, made positive definite; the first ones will not change.
+    def regular(self) -> "PlanCost":
+        """Return the cost with ``P``, which is changed, made positive definite."""
+        self.P[np.diag_indices_from(self.P)] += _RIDGE * np.max(np.diag(self.P))
+        return self
 
-        ``P``: (n, n); ``v``: (n,), m.
-        """
-        P[np.diag_indices_from(P)] += _RIDGE * np.max(np.diag(P)[n_pinned:])
-        return cls(P, v)
+    def of_change(self, plan: Array, splines: Array) -> "PlanCost":
+        """Return the cost of a change of a ``plan``, ``(n,)``, m, by sums of splines, ``(n, m)``."""
+        return PlanCost(splines.T @ self.P @ splines, splines.T @ (self.v - self.P @ plan))
 
     def without(self, pinned: Array) -> "PlanCost":
         """Return the cost of the other coefficients, where the first ones are ``pinned``, m."""
@@ -116,7 +138,7 @@ class SplineBasis:
         if weight is not None:
             W, target = weight[:, None] * W, weight * target
         P = W.T @ W + jerk_weight * (D.T @ D)
-        return PlanCost.regular(P, W.T @ target - jerk_weight * (D.T @ third_decided))
+        return PlanCost(P, W.T @ target - jerk_weight * (D.T @ third_decided))
 
 
 def _padded(samples: Array, n: int) -> Array:

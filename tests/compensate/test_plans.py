@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracle import clarabel_minimum
 from properties import examples
+from scipy.interpolate import BSpline
 from scipy.linalg import toeplitz
 from staircase_data import commanded
 
@@ -19,7 +20,7 @@ from hybridsep.base.signals import Array
 from hybridsep.compensate.newton import TOLERANCE
 from hybridsep.compensate.planning import has_stable_poles
 from hybridsep.compensate.qp import EXACT, Bounds, DriveBounds, Minimum, Tolerance, solve
-from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis
+from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis, solved_splines
 from hybridsep.compensate.stop import Stop
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.online.look_ahead import SepState
@@ -91,6 +92,22 @@ def test_where_the_command_exceeds_a_limit_it_is_widened_by_as_much(what: str, h
         np.testing.assert_allclose(at_most[23:41], 1.0 + near, rtol=1e-6, err_msg=what)
 
 
+@pytest.mark.parametrize(("n", "window"), [(90, 10), (90, 1), (47, 10), (24, 10), (12, 10), (111, 12), (3, 2)])
+def test_splines_that_are_solved_for_have_knots_further_apart(n: int, window: int) -> None:
+    basis = SplineBasis(2 * n + 9, 2, 20)
+    assert basis.n_free == n
+    splines = solved_splines(n, window)
+    assert np.linalg.matrix_rank(splines) == splines.shape[1]
+    k = np.arange(basis.preview)
+    for one in splines.T:
+        begin, count = int(np.flatnonzero(one)[0]), np.count_nonzero(one)
+        apart = 2 * {1: 1, 5: 2, 13: 4}[count]  # samples between knots
+        spline = BSpline.basis_element(np.arange(5), extrapolate=False)((k - 2 * begin) / apart)
+        np.testing.assert_allclose(basis.values[:, N_DECIDED:] @ one, np.nan_to_num(spline), rtol=0, atol=1e-15)
+    assert np.array_equal(splines[:, : min(n, 2 * window)], np.eye(n)[:, : min(n, 2 * window)])
+    assert np.flatnonzero(splines.any(axis=1))[-1] >= n - 4  # a change may last nearly as long as the plan
+
+
 def at_the_limits(seed: int) -> tuple[PlanCost, Bounds, Array]:
     """Return the cost, bounds and remainder of a plan whose command is at the drive's limits."""
     rng = np.random.default_rng(seed)
@@ -100,7 +117,7 @@ def at_the_limits(seed: int) -> tuple[PlanCost, Bounds, Array]:
     x_d = np.concatenate((np.zeros(30), path, np.full(preview, path[-1])))[:preview]
     rest, before = np.zeros(basis.values.shape[1]), np.zeros(3)
     free = np.cumsum(1e-6 * rng.normal(size=preview))
-    cost = basis.cost(g, free, x_d, before, before, 1.0)
+    cost = basis.cost(g, free, x_d, before, before, 1.0).regular()
     return cost, DriveBounds(basis, TS, PAPER_LIMITS, 1e-3).bounds(x_d, before, before, rest), rest[N_DECIDED:]
 
 
@@ -109,30 +126,27 @@ def at_the_limits(seed: int) -> tuple[PlanCost, Bounds, Array]:
 def test_few_steps_leave_a_plan_within_the_bounds(seed: int) -> None:
     """The remainder touches bounds: on the way from it a plan that exceeds one of them by a millionth would be none."""
     cost, bounds, rest = at_the_limits(seed)
-    n_pinned = 4
-    P, rows = cost.P[n_pinned:, n_pinned:], bounds.rows[:, n_pinned:]
-    v = cost.without(rest[:n_pinned]).v
-    least = clarabel_minimum(P, v, rows, bounds.low, bounds.high)
+    splines = np.eye(len(rest))[:, 4:]
+    of_change = cost.of_change(rest, splines)
+    P, v = of_change.P, of_change.v
+    least = clarabel_minimum(P, v, bounds.rows @ splines, bounds.low, bounds.high)
 
     def above_least(c: Array) -> float:
         return float(0.5 * (c @ P @ c - least @ P @ least) - v @ (c - least))
 
-    found = solve(cost, bounds, rest, n_pinned, always=True, tolerance=TOLERANCE)
+    found = solve(of_change, bounds.of_change(rest, splines), np.zeros(len(v)), 0, tolerance=TOLERANCE)
     assert found is not None
     assert found.steps > 0  # bounds are active
-    values = bounds.rows @ found.x
+    values = bounds.rows @ splines @ found.x
     assert np.max(np.maximum(values - bounds.high, bounds.low - values)) < 1e-9
-    assert above_least(found.x[n_pinned:]) < 0.02 * above_least(rest[n_pinned:])
+    assert above_least(found.x) < 0.02 * above_least(np.zeros(len(v)))
 
 
 @pytest.mark.slow
 def test_a_bounded_plan_costs_what_another_solver_finds(monkeypatch: pytest.MonkeyPatch) -> None:
     bounded = []
 
-    def compare(
-        cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, always: bool, tolerance: Tolerance
-    ) -> Minimum | None:
-        assert not always
+    def compare(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, tolerance: Tolerance) -> Minimum | None:
         assert tolerance == EXACT
         found = solve(cost, bounds, rest, n_pinned)
         assert found is not None

@@ -1,5 +1,6 @@
 #include "hsep_averaged_planner.h"
 
+#include "hsep_cholesky.h"
 #include "hsep_math.h"
 #include "hsep_vector.h"
 
@@ -103,23 +104,45 @@ static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_a
     return error + hsep_planner_jerk(task->planner, c, hsep_at(self, self->target));
 }
 
-/* Begin the linearisations of a window and the physics model's plan. */
+/* A spline that is solved for, and the sample that it begins with. */
+static hsep_knot averaged_planner_knot(const hsep_planner *planner, hsep_int i, hsep_int *begin)
+{
+    const hsep_knot knot = hsep_knots_at(&planner->knots, i);
+    *begin = (planner->n_pinned + knot.begin) * hsep_planner_splines(planner)->spacing;
+    return knot;
+}
+
+/* A spline with this distance of knots. */
+static hsep_linearised_change averaged_planner_shape(
+    hsep_averaged_planner *self, const hsep_planner *planner, hsep_int level)
+{
+    const hsep_int width = 4 * hsep_planner_splines(planner)->spacing;
+    return (hsep_linearised_change){
+        .commands = hsep_at(self, self->shapes) + (((hsep_int)1 << level) - 1) * width,
+        .n = width << level,
+        .passed = hsep_at(self, self->passed) + level * self->preview};
+}
+
+/* Begin the physics model's plan at the remainder of the last one, which was predicted last: W' W, and W' times the
+ * weighted error. */
 static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *weight = hsep_at(self, self->weight);
-    const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_linearised_change change = {
-        .commands = hsep_splines_shape(splines), .n = 4 * splines->spacing, .passed = task->spline};
-    hsep_real *target = hsep_at(self, self->target); /* x_d minus its response to x_d with what is decided of delta */
-    if (self->follows) {
-        hsep_linearised_begin((hsep_linearised *)hsep_at(self, self->linearised), task->model, &change);
-    }
-    averaged_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED);
+    hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
+    hsep_planner_open(task->planner, task->x_d);
+    hsep_planner_change(task->planner);
     for (hsep_int k = 0; k < self->preview; k++) {
         target[k] = weight[k] * weight[k] * (task->x_d[k] - self->start - x_pb[self->preview - 1 - k]);
     }
-    averaged_planner_command(self, task, hsep_at(self, self->rest), HSEP_N_DECIDED + self->n); /* as predicted last */
-    hsep_planner_open(task->planner, task->x_d);
+    for (hsep_int i = 0, begin; i < self->m; i++) {
+        const hsep_knot knot = averaged_planner_knot(task->planner, i, &begin);
+        const hsep_real *passed = averaged_planner_shape(self, task->planner, knot.level).passed;
+        v[i] = hsep_dot(passed, target + begin, self->preview - begin);
+    }
+    memcpy(
+        hsep_planner_quadratic(task->planner), hsep_at(self, self->gram),
+        (size_t)hsep_triangle(self->m) * sizeof(hsep_real));
+    hsep_planner_complete(task->planner, task->planner->jerk_weight);
 }
 
 /* Linearise at the best plan so far, which was predicted last. */
@@ -137,67 +160,106 @@ static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_a
     }
 }
 
-/* Change of x_h by a spline; W is kept without the zeros before the splines begin. */
-static hsep_real *averaged_planner_column_of(hsep_averaged_planner *self, hsep_int j, hsep_int spacing)
+/* Splines, from one on, whose changes of x_h are computed side by side: they have the same distance of knots. */
+static hsep_int averaged_planner_together(
+    const hsep_averaged_planner *self, const hsep_planner *planner, hsep_int first)
 {
-    const hsep_int first = self->n_pinned, i = j - first;
-    return hsep_at(self, self->W) + (i * (self->preview - spacing * first) - spacing * (i * (i - 1) / 2));
+    const hsep_int level = hsep_knots_at(&planner->knots, first).level;
+    hsep_int end = first;
+    while (end < self->m && end < first + HSEP_PHYSICS_ABREAST && hsep_knots_at(&planner->knots, end).level == level) {
+        end++;
+    }
+    return end - first;
 }
 
-/* Weighted changes of x_h by the next splines, as many as are computed side by side. */
+/* Weighted changes of x_h by the next splines; the first of a distance of knots begins the linearisation. */
 static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    const hsep_int spacing = hsep_planner_splines(task->planner)->spacing, first = self->spline;
-    const hsep_int left = self->n - first, count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
-    const hsep_real *at = hsep_at(self, self->best) + HSEP_N_DECIDED;
+    const hsep_int first = self->spline, count = averaged_planner_together(self, task->planner, first);
+    const hsep_int spacing = hsep_planner_splines(task->planner)->spacing;
     const hsep_real *weight = hsep_at(self, self->weight);
+    hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
-    for (hsep_int c = 0; c < count; c++) {
-        columns[c] = averaged_planner_column_of(self, first + c, spacing);
+    hsep_int from;
+    const hsep_int level = averaged_planner_knot(task->planner, first, &from).level, apart = spacing << level;
+    if (first == 0 || hsep_knots_at(&task->planner->knots, first - 1).level != level) {
+        const hsep_linearised_change change = averaged_planner_shape(self, task->planner, level);
+        hsep_linearised_begin(linearised, task->model, &change);
     }
-    hsep_linearised_columns(
-        (hsep_linearised *)hsep_at(self, self->linearised), task->model, first * spacing, spacing, count, columns);
-    for (hsep_int j = first; j < first + count; j++) {
-        hsep_real *column = columns[j - first];
-        for (hsep_int k = j * spacing; k < self->preview; k++) {
-            column[k - j * spacing] *= weight[k];
+    for (hsep_int c = 0; c < count; c++) {
+        columns[c] = hsep_at(self, self->W) + ((first + c) * self->preview + from + c * apart);
+    }
+    hsep_linearised_columns(linearised, task->model, from, apart, count, columns);
+    for (hsep_int c = 0; c < count; c++) {
+        const hsep_int begin = from + c * apart;
+        for (hsep_int k = begin; k < self->preview; k++) {
+            columns[c][k - begin] *= weight[k];
         }
-        hsep_axpy(target + j * spacing, at[j], column, self->preview - j * spacing);
+        hsep_axpy(target + begin, hsep_at(self, self->change)[first + c], columns[c], self->preview - begin);
     }
     self->spline += count;
 }
 
-/* Some rows of the programme of a Newton step, P = W' W + jerk_weight D' D, and of its linear term, for the splines
- * that are not pinned; the plan that is linearised at has the pinned ones in it. */
-static void averaged_planner_products(hsep_averaged_planner *self, const hsep_averaged_task *task)
+/* Some rows of the programme of a Newton step, P = W' W, and of its linear term. */
+static void averaged_planner_products(hsep_averaged_planner *self, hsep_planner *planner)
 {
-    const hsep_splines *splines = hsep_planner_splines(task->planner);
-    const hsep_int n = self->n, spacing = splines->spacing, first = self->n_pinned;
-    const hsep_int preview = self->preview, begin = self->spline;
-    const hsep_int end = begin + HSEP_AVERAGED_PRODUCTS < n ? begin + HSEP_AVERAGED_PRODUCTS : n;
-    hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
-    hsep_real *P = hsep_planner_quadratic(task->planner, begin);
-    for (hsep_int i = begin; i < end; i++) {
-        const hsep_real *left = averaged_planner_column_of(self, i, spacing);
-        hsep_int j = i; /* column j begins (j - i) spacing later */
-        for (; j + 4 <= n; j += 4, P += 4) {
-            const hsep_real *rights[4]; /* from where the last of them begins */
+    const hsep_int m = self->m, preview = self->preview, first = self->spline;
+    const hsep_int end = first + HSEP_AVERAGED_PRODUCTS < m ? first + HSEP_AVERAGED_PRODUCTS : m;
+    const hsep_real *W = hsep_at(self, self->W), *target = hsep_at(self, self->target);
+    hsep_real *v = hsep_planner_linear(planner);
+    hsep_real *P = hsep_planner_quadratic(planner) + (first * m - first * (first - 1) / 2);
+    for (hsep_int i = first, begin, from; i < end; i++) {
+        (void)averaged_planner_knot(planner, i, &begin);
+        for (hsep_int j = i, count; j < m; j += count, P += count) {
+            const hsep_real *rights[4];
+            hsep_real sums[4];
+            hsep_int earliest = preview;
+            count = m - j < 4 ? m - j : 4;
             for (hsep_int c = 0; c < 4; c++) {
-                rights[c] = averaged_planner_column_of(self, j + c, spacing) + (3 - c) * spacing;
+                const hsep_int column = c < count ? j + c : j;
+                (void)averaged_planner_knot(planner, column, &from);
+                earliest = from < earliest ? from : earliest;
+                rights[c] = W + column * preview;
             }
-            hsep_dot_four(left + (j + 3 - i) * spacing, rights, preview - (j + 3) * spacing, P);
-            for (hsep_int c = 0; c < 3; c++) {
-                const hsep_int before = (3 - c) * spacing;
-                P[c] += hsep_dot(left + (j + c - i) * spacing, rights[c] - before, before);
+            earliest = earliest > begin ? earliest : begin;
+            for (hsep_int c = 0; c < 4; c++) {
+                rights[c] += earliest;
             }
+            hsep_dot_four(W + i * preview + earliest, rights, preview - earliest, sums);
+            memcpy(P, sums, (size_t)count * sizeof(hsep_real));
         }
-        for (; j < n; j++) {
-            const hsep_real *right = averaged_planner_column_of(self, j, spacing);
-            *P++ = hsep_dot(left + (j - i) * spacing, right, preview - j * spacing);
-        }
-        v[i - first] = hsep_dot(left, target + i * spacing, preview - i * spacing);
+        v[i] = hsep_dot(W + i * preview + begin, target + begin, preview - begin);
     }
     self->spline = end;
+}
+
+HSEP_API void hsep_averaged_planner_shape(hsep_averaged_planner *self, hsep_planner *plans, const hsep_real spline[])
+{
+    const hsep_splines *splines = hsep_planner_splines(plans);
+    const hsep_int spacing = splines->spacing, preview = self->preview;
+    const hsep_real *weight = hsep_at(self, self->weight), *b = hsep_splines_shape(splines);
+    for (hsep_int i = 0, begin; i < self->m; i++) {
+        const hsep_knot knot = averaged_planner_knot(plans, i, &begin);
+        const hsep_linearised_change change = averaged_planner_shape(self, plans, knot.level);
+        hsep_real *commands = hsep_at(self, (hsep_int)(change.commands - hsep_at(self, 0)));
+        hsep_real *passed = hsep_at(self, (hsep_int)(change.passed - hsep_at(self, 0)));
+        memset(commands, 0, (size_t)change.n * sizeof(hsep_real));
+        memset(passed, 0, (size_t)preview * sizeof(hsep_real));
+        for (hsep_int j = 0; j < knot.length; j++) {
+            hsep_axpy(commands + j * spacing, knot.share[j], b, 4 * spacing);
+            if (j * spacing < preview) {
+                hsep_axpy(passed + j * spacing, knot.share[j], spline, preview - j * spacing);
+            }
+        }
+        for (hsep_int k = begin; k < preview; k++) {
+            hsep_at(self, self->W)[i * preview + k] = weight[k] * passed[k - begin];
+        }
+    }
+    while (self->spline < self->m) {
+        averaged_planner_products(self, plans);
+    }
+    memcpy(
+        hsep_at(self, self->gram), hsep_planner_quadratic(plans), (size_t)hsep_triangle(self->m) * sizeof(hsep_real));
 }
 
 /* Steps of the solver for the physics model's plan, and for a Newton step. */
@@ -220,7 +282,7 @@ static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averag
 #ifdef HSEP_FLOAT32
     tolerance.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
 #endif
-    const hsep_plan_status status = hsep_planner_solve(task->planner, 1, &tolerance);
+    const hsep_plan_status status = hsep_planner_solve(task->planner, &tolerance);
     self->solving = status == HSEP_PLAN_BOUNDED;
     return status != HSEP_PLAN_FAILED;
 }
@@ -230,6 +292,7 @@ static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averag
 static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
+    hsep_real *change = hsep_at(self, self->change), *found = hsep_at(self, self->found);
     const hsep_real cost = averaged_planner_cost(self, task, c);
     self->tries++;
     if (averaged_planner_better(cost, self->cost)) {
@@ -237,10 +300,14 @@ static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_avera
         self->tries = HSEP_AVERAGED_TRIES;
         self->cost = cost;
         averaged_planner_copy(self, best, c);
+        memcpy(change, found, (size_t)self->m * sizeof(hsep_real));
     } else if (self->tries < HSEP_AVERAGED_TRIES) {
         const hsep_real shorter = averaged_planner_lengths[self->tries] / averaged_planner_lengths[self->tries - 1];
         for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
             c[j] = best[j] + shorter * (c[j] - best[j]);
+        }
+        for (hsep_int i = 0; i < self->m; i++) {
+            found[i] = change[i] + shorter * (found[i] - change[i]);
         }
     }
 }
@@ -285,7 +352,7 @@ typedef struct {
     hsep_real row;       /* and a row of features for variances */
     hsep_real predict;   /* half of a prediction without variances, and of its cost */
     hsep_real linearise; /* slopes of the disturbances, and gains with them */
-    hsep_real pairs;     /* one of every pair of splines that are not pinned, */
+    hsep_real pairs;     /* one of every pair of splines that are solved for, */
     hsep_real factor;    /* the factor of a programme, */
     hsep_real solve;     /* its bounds, and whether they allow its minimum, */
     hsep_real step;      /* and a part of a solver's step */
@@ -294,7 +361,8 @@ typedef struct {
 static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
-    const hsep_real all = (hsep_real)(self->preview + self->late), n = (hsep_real)(self->n - self->n_pinned);
+    const hsep_real all = (hsep_real)(self->preview + self->late);
+    const hsep_real n = (hsep_real)(self->ends ? task->planner->knots.n : self->m);
     averaged_planner_work work = {.number = HSEP_WORK_NUMBER * (hsep_real)self->preview, .pairs = n * n};
     hsep_real run = HSEP_N_EXPERTS * HSEP_WORK_NUMBER; /* the stack */
     work.sample = run;
@@ -324,11 +392,10 @@ static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planne
 static hsep_real averaged_planner_of_products(
     const hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int begin, hsep_int end)
 {
-    const hsep_real spacing = (hsep_real)hsep_planner_splines(task->planner)->spacing;
     hsep_real sum = 0.0;
-    for (hsep_int i = begin; i < end && i < self->n; i++) {
-        const hsep_real middle = 0.5 * (hsep_real)(i + self->n - 1);
-        sum += (hsep_real)(self->n - i) * ((hsep_real)self->preview - spacing * middle + 0.5 * HSEP_WORK_NUMBER);
+    for (hsep_int i = begin, from; i < end && i < self->m; i++) {
+        (void)averaged_planner_knot(task->planner, i, &from);
+        sum += 0.5 * (hsep_real)(self->m - i) * ((hsep_real)(self->preview - from) + HSEP_WORK_NUMBER);
     }
     return sum;
 }
@@ -352,7 +419,6 @@ static hsep_real averaged_planner_left(
     const hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work)
 {
     const hsep_linearised *linearised = (const hsep_linearised *)hsep_at_const(self, self->linearised);
-    const hsep_int spacing = hsep_planner_splines(task->planner)->spacing, n = self->n, pinned = self->n_pinned;
     const hsep_int window = self->late + self->Np, behind = self->preview - self->Np, first = self->samples;
     const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
     hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
@@ -372,10 +438,11 @@ static hsep_real averaged_planner_left(
         left += programme + 2.0 * work->predict + (hsep_real)averaged_planner_tolerance.steps * parts;
     }
     if (self->place == 0 && self->follows) {
-        hsep_real newton = work->linearise + averaged_planner_of_products(self, task, pinned, n) + work->factor +
+        hsep_real newton = work->linearise + averaged_planner_of_products(self, task, 0, self->m) + work->factor +
                            work->solve + 2.0 * HSEP_AVERAGED_TRIES * work->predict;
-        for (hsep_int j = pinned; j < self->n; j += HSEP_PHYSICS_ABREAST) {
-            newton += hsep_linearised_work(linearised, task->model, j * spacing);
+        for (hsep_int i = 0, from; i < self->m; i += averaged_planner_together(self, task->planner, i)) {
+            (void)averaged_planner_knot(task->planner, i, &from);
+            newton += hsep_linearised_work(linearised, task->model, from);
         }
         for (hsep_int i = 0; i < self->n_steps; i++) {
             left += newton + (hsep_real)averaged_planner_steps(self, i) * parts;
@@ -399,7 +466,8 @@ static hsep_real averaged_planner_left(
 static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const averaged_planner_work work = averaged_planner_work_of(self, task);
-    const hsep_int all = self->late + self->preview, spacing = hsep_planner_splines(task->planner)->spacing;
+    const hsep_int all = self->late + self->preview;
+    hsep_int from;
     hsep_planner *planner = task->planner;
     hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
@@ -421,13 +489,10 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            AVERAGED_PLANNER_YIELD(2, (self->follows ? 15.0 : 12.0) * work.number);
+            AVERAGED_PLANNER_YIELD(2, 15.0 * work.number + 4.0 * work.pairs);
             averaged_planner_open(self, task);
-            AVERAGED_PLANNER_YIELD(3, 4.0 * work.pairs);
-            hsep_planner_aim(planner, hsep_at(self, self->gram), task->spline, hsep_at(self, self->target));
-            hsep_planner_pin(planner);
             AVERAGED_PLANNER_YIELD(4, work.factor);
-            self->planned = (hsep_int)hsep_planner_factor(planner, 1);
+            self->planned = (hsep_int)hsep_planner_factor(planner);
         }
         if (self->planned) {
             AVERAGED_PLANNER_YIELD(5, work.solve);
@@ -448,7 +513,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             AVERAGED_PLANNER_YIELD(20, 15.0 * work.number + 4.0 * work.pairs);
             hsep_planner_end(planner, task->x_d);
             AVERAGED_PLANNER_YIELD(21, work.factor);
-            if (hsep_planner_factor(planner, 1)) {
+            if (hsep_planner_factor(planner)) {
                 AVERAGED_PLANNER_YIELD(22, work.solve);
                 (void)averaged_planner_solve(self, task, averaged_planner_tolerance.steps);
                 while (self->solving) {
@@ -471,8 +536,9 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         /* Newton steps from the remainder of the last plan, as long as they lower the cost */
         if (self->follows) {
             averaged_planner_copy(self, hsep_at(self, self->best), rest);
+            memset(hsep_at(self, self->change), 0, (size_t)self->m * sizeof(hsep_real));
             hsep_planner_follow_friction(planner);
-            planner->change = self->change;
+            planner->change = self->bound;
         }
         self->gains = self->follows;
         for (self->steps = 0; self->gains && self->steps < self->n_steps; self->steps++) {
@@ -480,18 +546,19 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             averaged_planner_copy(self, c, rest);
             AVERAGED_PLANNER_YIELD(7, work.linearise);
             averaged_planner_linearise(self, task);
-            for (self->spline = self->n_pinned; self->spline < self->n;) {
-                AVERAGED_PLANNER_YIELD(8, hsep_linearised_work(linearised, task->model, self->spline * spacing));
+            for (self->spline = 0; self->spline < self->m;) {
+                (void)averaged_planner_knot(planner, self->spline, &from);
+                AVERAGED_PLANNER_YIELD(8, hsep_linearised_work(linearised, task->model, from));
                 averaged_planner_columns(self, task);
             }
-            for (self->spline = self->n_pinned; self->spline < self->n;) {
+            for (self->spline = 0; self->spline < self->m;) {
                 AVERAGED_PLANNER_YIELD(
                     9, averaged_planner_of_products(self, task, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
-                averaged_planner_products(self, task);
+                averaged_planner_products(self, planner);
             }
             AVERAGED_PLANNER_YIELD(10, work.factor);
-            hsep_planner_complete(planner, self->n_pinned, planner->jerk_weight);
-            if (!hsep_planner_factor(planner, 1)) {
+            hsep_planner_complete(planner, planner->jerk_weight);
+            if (!hsep_planner_factor(planner)) {
                 break;
             }
             AVERAGED_PLANNER_YIELD(11, work.solve);
@@ -502,6 +569,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
                 AVERAGED_PLANNER_YIELD(12, work.step);
                 self->solving = !hsep_planner_advance(planner);
             }
+            memcpy(hsep_at(self, self->found), hsep_planner_found(planner), (size_t)self->m * sizeof(hsep_real));
             for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
                 AVERAGED_PLANNER_YIELD(13, work.predict);
                 averaged_planner_begin_to_predict(self, task, c);
@@ -571,8 +639,8 @@ HSEP_API void hsep_averaged_planner_begin(
     for (hsep_int k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - self->start;
     }
-    self->change = averaged_planner_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
-    task->planner->change = hsep_averaged_doubts(task->model) ? 1.0 : self->change;
+    self->bound = averaged_planner_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
+    task->planner->change = hsep_averaged_doubts(task->model) ? 1.0 : self->bound;
     averaged_planner_command(self, task, rest, HSEP_N_DECIDED + self->n);
     const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->samples = self->late + (pinned > 0 ? pinned : 1);

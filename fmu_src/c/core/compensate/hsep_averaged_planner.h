@@ -24,12 +24,13 @@
 #define HSEP_AVERAGED_TRIES 2    /* lengths of a Newton step that are tried, */
 #define HSEP_AVERAGED_VARIED 4   /* variances that are computed in a part, */
 #define HSEP_AVERAGED_PRODUCTS 8 /* rows of a programme that are */
+#define HSEP_AVERAGED_SHAPES 28  /* spacings of splines with knots 1, 2 and 4 of them apart: 4 each time */
 #define HSEP_AVERAGED_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
 
 typedef struct {
     hsep_int preview, p, Np;
     hsep_int late;          /* samples before the window that are not measured yet: they are predicted, too */
-    hsep_int n, n_pinned;   /* splines of a plan, and the first ones, which stay as they were */
+    hsep_int n, m;          /* splines of a plan, and those that it is solved for */
     hsep_int place;         /* yield behind which the plan goes on; 0: at its beginning */
     hsep_int judges;        /* whether the averaged model judges plans, */
     hsep_int follows;       /* and whether it may plan */
@@ -39,14 +40,14 @@ typedef struct {
     hsep_int gains;         /* whether the last one lowered the cost, */
     hsep_int tries;         /* and lengths of it that were tried */
     hsep_int samples;       /* samples that are predicted, */
-    hsep_int spline;        /* splines that are pinned, or whose change of x_h, or row of the programme, is computed */
+    hsep_int spline;        /* splines whose change of x_h, or row of the programme, is computed */
     hsep_int solving;       /* whether a bounded programme is being solved */
     hsep_int planned;       /* model of the plan: 0 none, 1 physics, 2 averaged */
     hsep_int paused;        /* windows that the averaged model does not plan, now */
     hsep_int pause;         /* and after the next of its plans that runs away */
     hsep_real cost;         /* m2, of the best plan so far, */
     hsep_real cost_of_rest; /* and of the remainder of the last plan */
-    hsep_real change;       /* share of change_max that bounds the averaged model's plan */
+    hsep_real bound;        /* share of change_max that bounds the averaged model's plan */
     hsep_real start;        /* m, position of rest */
     hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
     hsep_real left;         /* and that this part and all after it take at most */
@@ -54,28 +55,30 @@ typedef struct {
     hsep_int rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_int best;       /* (3 + n,) m, coefficients of the best plan so far */
     hsep_int of_physics; /* (3 + n,) m, coefficients of the physics model's plan */
+    hsep_int change;     /* (m,) m, what changes the remainder of the last plan to the best one, */
+    hsep_int found;      /* (m,) m, and to the one that is tried */
     hsep_int command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
     hsep_int x_pb;       /* (preview + late,) m, their prediction by the physics model, */
     hsep_int e_h;        /* (preview + late + p,) m, and what the averaged model adds; behind it the last residuals */
     hsep_int target;     /* (preview,) m, work */
     hsep_int weight;     /* (preview,) of the errors of a plan: they count less at its end */
-    hsep_int gram;       /* quadratic part of the physics model's plans (hsep_planner_gram) */
-    hsep_int W;          /* changes of x_h by the splines that are not pinned: of spline j from sample j spacing on,
-                          * behind each other */
+    hsep_int shapes;     /* (HSEP_AVERAGED_SHAPES spacing,) splines of each distance of knots, one after the other, */
+    hsep_int passed;     /* (HSEP_KNOTS_LEVELS, preview) and these behind G_pb */
+    hsep_int gram;       /* triangle of m rows, W' W with G_pb alone */
+    hsep_int W;          /* (m, preview) weighted changes of x_h by splines, 0 before they begin */
     hsep_int linearised;
     hsep_int physics; /* G_pb at the beginning of the window, */
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 39);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 43);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
     hsep_averaged *model;
     hsep_planner *planner;
-    const hsep_real *spline; /* (preview,) m/m, a spline filtered by the physics model */
-    const hsep_real *x_d;    /* (preview,) m, commanded positions, */
-    const hsep_real *load;   /* (preview,) m, and what the drive's load adds to them */
+    const hsep_real *x_d;  /* (preview,) m, commanded positions, */
+    const hsep_real *load; /* (preview,) m, and what the drive's load adds to them */
     /* Before the window: G_pb; command and x_pb of the samples that are not measured yet, (late,) m, newest first; and
      * the last residuals measured, (p,) m, likewise */
     const hsep_physics *physics;
@@ -86,10 +89,14 @@ HSEP_API hsep_real hsep_averaged_planner_lay_out(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner);
 
 /* Fill the block, which is 0, for a drive at rest at start, m, with the planner that solves its plans and a spline
- * filtered by the physics model, (preview,), m/m. Cost: as hsep_planner_gram. */
+ * filtered by the physics model, (preview,), m/m. Cost: m^2 preview / 4 multiply-adds. */
 HSEP_API void hsep_averaged_planner_init(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start, hsep_planner *plans, const hsep_real spline[]);
+
+/* The part of it for which columns and products of a Newton step are needed: splines of each distance of knots, and what
+ * they give with the physics model alone. */
+HSEP_API void hsep_averaged_planner_shape(hsep_averaged_planner *self, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
  * averaged. warm: whether the warm-up is over, so that the averaged model judges plans. It predicts only the samples

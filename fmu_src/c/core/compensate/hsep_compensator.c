@@ -77,7 +77,6 @@ static hsep_averaged_task compensator_task(hsep_compensator *self)
     return (hsep_averaged_task){
         .model = hsep_residual_averaged(hsep_predictor_model(predictor)),
         .planner = hsep_compensator_planner(self),
-        .spline = hsep_at(self, self->spline_pb),
         .x_d = hsep_at(predictor, predictor->x_d),
         .load = hsep_at(self, self->load),
         .physics = hsep_predictor_physics(predictor),
@@ -231,9 +230,9 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     const hsep_real *spline =
         state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
     hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
-    hsep_planner_aim(hsep_compensator_planner(self), NULL, spline, hsep_at(self, self->target));
-    const hsep_plan_status status = hsep_planner_factor(hsep_compensator_planner(self), 0)
-                                        ? hsep_planner_solve(hsep_compensator_planner(self), 0, &compensator_exact)
+    hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
+    const hsep_plan_status status = hsep_planner_factor(hsep_compensator_planner(self))
+                                        ? hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact)
                                         : HSEP_PLAN_FAILED;
     self->state = (hsep_int)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
@@ -259,8 +258,7 @@ static int compensator_plan(hsep_compensator *self)
     } else if (self->compensate == HSEP_SEP_OFF && before != HSEP_SEP_OFF) {
         hsep_planner *planner = hsep_compensator_planner(self);
         hsep_planner_end(planner, hsep_at(predictor, predictor->x_d));
-        status =
-            hsep_planner_factor(planner, 1) ? hsep_planner_solve(planner, 1, &compensator_exact) : HSEP_PLAN_FAILED;
+        status = hsep_planner_factor(planner) ? hsep_planner_solve(planner, &compensator_exact) : HSEP_PLAN_FAILED;
     }
     predictor->n_physics = self->state == HSEP_SEP_HYBRID ? 0 : predictor->Np;
     return status == HSEP_PLAN_BOUNDED;

@@ -171,11 +171,14 @@ static hsep_real slacks_move(const slacks *self)
 /* The arrays behind the struct. */
 typedef struct {
     const hsep_splines *splines;
-    hsep_int first, n;   /* the first spline that is not fixed; entries of x */
+    const hsep_knots *knots;
+    hsep_int first, n;   /* the first spline that is not fixed; entries of x, as many as there are knots */
     hsep_real *x, *v;    /* (n,) iterate and linear term */
     hsep_real *inner;    /* (n,) iterate that is farthest inside the bounds */
     hsep_real *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
     hsep_real *factor;   /* triangle of n rows */
+    hsep_real *c;        /* work: uniform splines, */
+    hsep_real *products;    /* and their products */
     slacks slacks;
 } interior_arrays;
 
@@ -204,6 +207,8 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n
         *of_bounds[i] = interior_take(block, &end, 2.0 * rows);
     }
     a->factor = interior_take(block, &end, hsep_triangle(n));
+    a->c = interior_take(block, &end, columns + 2.0 * HSEP_KNOTS_NEAR);
+    a->products = interior_take(block, &end, HSEP_KNOTS_WIDTH * columns);
     return end * sizeof(hsep_real);
 }
 
@@ -218,14 +223,15 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
     interior_arrays a;
     (void)interior_lay_out((hsep_real *)self, splines->preview, splines->n, &a);
     a.splines = splines;
-    a.first = self->first;
-    a.n = splines->n - a.first;
+    a.knots = &self->knots;
+    a.first = splines->n - self->knots.n;
+    a.n = self->knots.m;
     a.slacks.rho = self->rho;
     a.slacks.n = 0;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        const hsep_int begin = self->first * splines->spacing + 1; /* a spline begins with 0 */
+        const hsep_int begin = a.first * splines->spacing + 1; /* a spline begins with 0 */
         a.slacks.range[order].begin = begin + order * splines->preview;
-        a.slacks.range[order].count = (splines->n + 3) * splines->spacing + order - begin;
+        a.slacks.range[order].count = (a.first + a.knots->end + 3) * splines->spacing + order - begin;
         a.slacks.n += 2 * a.slacks.range[order].count;
     }
     return a;
@@ -234,8 +240,17 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
 /* B of x or dx, (n,), to ds. */
 static void interior_rows(const interior_arrays *a, const hsep_real x[])
 {
-    hsep_splines_rows(a->splines, x, a->first, a->slacks.rows);
+    hsep_knots_widen(a->knots, x, a->c);
+    hsep_splines_rows(a->splines, a->c, a->first, a->slacks.rows);
     slacks_take_rows(&a->slacks, a->slacks.rows, a->slacks.rows, a->slacks.ds);
+}
+
+/* g, (n,), += A' of the rows. */
+static void interior_transpose(const interior_arrays *a, hsep_real g[])
+{
+    memset(a->c, 0, (size_t)a->knots->n * sizeof(hsep_real));
+    hsep_splines_transpose(a->splines, a->slacks.rows, a->first, a->c);
+    hsep_knots_narrow(a->knots, a->c, g);
 }
 
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines)
@@ -246,14 +261,16 @@ HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_spli
         .x = a.x,
         .inner = self->beyond < self->tolerance.margin ? a.inner : NULL,
         .low = a.slacks.rows,
-        .high = a.slacks.work};
+        .high = a.slacks.work,
+        .c = a.c,
+        .products = a.products};
 }
 
 HSEP_API void hsep_interior_begin(
-    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_int first, hsep_real cost,
+    hsep_interior *self, const hsep_splines *splines, const hsep_knots *knots, const hsep_real P[], hsep_real cost,
     const hsep_tolerance *tolerance)
 {
-    self->first = first;
+    self->knots = *knots;
     self->tolerance = *tolerance;
     self->steps = self->part = 0;
     interior_arrays a = interior_open(self, splines);
@@ -286,7 +303,7 @@ static hsep_real interior_dual_residual(const interior_arrays *a, const hsep_rea
     }
     memset(a->dx, 0, (size_t)a->n * sizeof(hsep_real));
     slacks_give_rows(&a->slacks, a->slacks.z, -1.0);
-    hsep_splines_transpose(a->splines, a->slacks.rows, a->first, a->dx);
+    interior_transpose(a, a->dx);
     for (hsep_int j = 0; j < a->n; j++) {
         largest = hsep_fmax(
             hsep_fmax(largest, hsep_fabs(a->v[j])), hsep_fmax(hsep_fabs(a->v[j] - a->r_d[j]), hsep_fabs(a->dx[j])));
@@ -301,7 +318,7 @@ static void interior_direction(const interior_arrays *a)
 {
     slacks_push(&a->slacks);
     memcpy(a->dx, a->r_d, (size_t)a->n * sizeof(hsep_real));
-    hsep_splines_transpose(a->splines, a->slacks.rows, a->first, a->dx);
+    interior_transpose(a, a->dx);
     hsep_cholesky_solve(a->factor, a->n, a->dx);
     interior_rows(a, a->dx);
 }
@@ -333,7 +350,8 @@ static int interior_factor(const interior_arrays *a, const hsep_real P[], hsep_i
     if (part == 0) {
         memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
         slacks_weigh(&a->slacks);
-        hsep_splines_gram(a->splines, a->slacks.rows, a->first, a->factor, a->slacks.work);
+        hsep_splines_gram(a->splines, a->slacks.rows, a->first, a->products, a->slacks.work);
+        hsep_knots_add(a->knots, a->products, a->factor, a->c);
     }
     return !hsep_cholesky_rows(a->factor, a->n, ends[part], ends[part + 1], NULL);
 }

@@ -1,6 +1,6 @@
 /* Primal-dual interior-point solver for a bounded plan: Mehrotra's predictor-corrector method (1992), a part of
  * a step a call:
- *  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows.
+ *  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows of hsep_knots_widen.
  *
  * An iterate stays inside the bounds once a full step has reached them. What is found after fewer steps may exceed
  * them: the iterate that was farthest inside is kept beside it. A block as hsep_layout.h has them.
@@ -8,6 +8,7 @@
 #ifndef HSEP_INTERIOR_H
 #define HSEP_INTERIOR_H
 
+#include "hsep_knots.h"
 #include "hsep_layout.h"
 #include "hsep_splines.h"
 
@@ -23,7 +24,7 @@ typedef struct {
 
 typedef struct {
     hsep_tolerance tolerance;
-    hsep_int first;   /* the splines before it are fixed; x is (n - first,) */
+    hsep_knots knots; /* of x, (m,); the splines before them are fixed */
     hsep_int steps;   /* begun for this plan */
     hsep_int part;    /* of the last one that comes next: residuals, 1 to 3 the factor, predictor, corrector */
     hsep_real mu;     /* m2, of its beginning */
@@ -33,29 +34,31 @@ typedef struct {
     /* followed by arrays, see interior_lay_out */
 } hsep_interior;
 
-HSEP_ASSERT_WORDS(hsep_interior, 11);
+HSEP_ASSERT_WORDS(hsep_interior, 19);
 
 HSEP_API hsep_real hsep_interior_size(hsep_int preview, hsep_int n); /* bytes of the block, counted as a number */
 
-/* Where the problem goes before hsep_interior_begin; of v and x the first n - first entries count. */
+/* Where the problem goes before hsep_interior_begin; of v, x and inner the first m entries count. */
 typedef struct {
     hsep_real *v;          /* (n,) m */
     hsep_real *x;          /* (n,) m, start and result */
     hsep_real *inner;      /* (n,) m, result: the iterate farthest inside the bounds without their margin, or NULL */
     hsep_real *low, *high; /* (4 preview,), in shares */
+    hsep_real *c;          /* (n + 2 HSEP_KNOTS_NEAR,) work, before and behind it, */
+    hsep_real *products;   /* (n, HSEP_KNOTS_WIDTH) and for products of splines */
 } hsep_problem;
 
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines);
 
-/* Begin with x and the bounds as they are. P: the triangle of n - first rows; cost: scale of the cost, m2, > 0, for the
- * tolerance. */
+/* Begin with x and the bounds as they are. knots: of the last splines; P: the triangle of m rows; cost: scale of the
+ * cost, m2, > 0, for the tolerance. */
 HSEP_API void hsep_interior_begin(
-    hsep_interior *self, const hsep_splines *splines, const hsep_real P[], hsep_int first, hsep_real cost,
+    hsep_interior *self, const hsep_splines *splines, const hsep_knots *knots, const hsep_real P[], hsep_real cost,
     const hsep_tolerance *tolerance);
 
 /* Do a part of a step: its residuals, a third of its factor, its predictor or its corrector. P: as in
- * hsep_interior_begin. Returns whether the plan is solved. Cost: n^3 / 6 multiply-adds for the factor, n^2 before and
- * 2 n^2 after it, and about 900 operations and 8 divisions a sample of the plan in all. */
+ * hsep_interior_begin. Returns whether the plan is solved. Cost: m^3 / 6 multiply-adds for the factor, m^2 before and
+ * 2 m^2 after it, and about 900 operations and 8 divisions a sample of the plan in all. */
 HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[]);
 
 #endif

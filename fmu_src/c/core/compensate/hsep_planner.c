@@ -28,6 +28,7 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_p
     self->Np = parameters->Np;
     self->n_pinned = hsep_planner_n_pinned(parameters);
     self->no_reversal = parameters->no_reversal != 0;
+    self->knots = hsep_knots_of(n - self->n_pinned, parameters->averaged ? parameters->Np / parameters->spacing : 0);
     self->jerk_weight = parameters->jerk_weight;
     self->c = hsep_take(&end, HSEP_N_DECIDED + (hsep_real)n);
     self->total = hsep_take(&end, HSEP_ORDERS * preview);
@@ -66,7 +67,7 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 /* The drive's limits are linear constraints on the rows of a plan (hsep_splines.h), in shares of a limit. */
 
 /* Rows of x_dm, of delta in order 0, under the remainder of the last plan, in shares; and the direction of x_d. */
-static void planner_total(hsep_planner *self, const hsep_real x_d[])
+HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int preview = splines->preview;
@@ -176,29 +177,55 @@ HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_re
     return bounded / (hsep_real)self->Np;
 }
 
-HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self)
+static hsep_problem planner_problem(hsep_planner *self)
 {
-    return hsep_interior_problem(planner_interior(self), hsep_planner_splines(self)).v;
+    return hsep_interior_problem(planner_interior(self), hsep_planner_splines(self));
 }
 
-HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
+HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self) { return planner_problem(self).v; }
+
+HSEP_API const hsep_real *hsep_planner_found(hsep_planner *self) { return planner_problem(self).x; }
+
+/* The first spline that this cost is of, and the triangle of its quadratic part. */
+static hsep_int planner_first(const hsep_planner *self) { return hsep_planner_splines(self)->n - self->solved.n; }
+
+static const hsep_real *planner_triangle(const hsep_planner *self)
 {
-    (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED, hsep_at(self, self->third));
-    planner_total(self, x_d);
+    const hsep_int first = self->changes ? 0 : planner_first(self);
+    return hsep_at_const(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
+}
+
+/* Rows of splines x, (m,), of this cost. */
+static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows[])
+{
+    hsep_real *c = planner_problem(self).c;
+    hsep_knots_widen(&self->solved, x, c);
+    hsep_splines_rows(hsep_planner_splines(self), c, planner_first(self), rows);
 }
 
 HSEP_API void hsep_planner_follow_friction(hsep_planner *self)
 {
     memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(hsep_real));
-    (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED + self->n_pinned, hsep_at(self, self->third));
 }
 
-HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first, hsep_real jerk_weight)
+HSEP_API void hsep_planner_change(hsep_planner *self)
 {
-    const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int n = splines->n - first;
-    hsep_real *P = hsep_planner_quadratic(self, first), *diagonal = P, largest = 0.0;
-    hsep_splines_add_jerk(splines, jerk_weight, hsep_at(self, self->third), first, P, hsep_planner_linear(self));
+    const hsep_int all = HSEP_N_DECIDED + hsep_planner_splines(self)->n;
+    self->changes = 1;
+    self->solved = self->knots;
+    (void)planner_third(self, hsep_at(self, self->c), all, hsep_at(self, self->third));
+}
+
+HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)
+{
+    const hsep_int n = self->solved.m;
+    const hsep_problem problem = planner_problem(self);
+    hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0;
+    hsep_splines_jerk(
+        hsep_planner_splines(self), jerk_weight, hsep_at(self, self->third), planner_first(self), problem.products,
+        problem.c);
+    hsep_knots_narrow(&self->solved, problem.c, problem.v);
+    hsep_knots_add(&self->solved, problem.products, P, problem.c);
     for (hsep_int i = 0; i < n; i++) {
         largest = hsep_fmax(largest, *diagonal);
         diagonal += n - i;
@@ -209,49 +236,28 @@ HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first, hsep_rea
     }
 }
 
-HSEP_API void hsep_planner_aim(
-    hsep_planner *self, const hsep_real gram[], const hsep_real filtered[], const hsep_real target[])
+HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_real *v = hsep_planner_linear(self);
+    self->changes = 0;
+    self->solved = hsep_knots_of(splines->n, 0);
+    (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED, hsep_at(self, self->third));
     for (hsep_int j = 0; j < splines->n; j++) { /* W' target */
         const hsep_int begin = j * splines->spacing;
         v[j] = hsep_dot(filtered, target + begin, splines->preview - begin);
     }
-    if (gram == NULL) {
-        hsep_splines_filtered_gram(splines, filtered, hsep_at(self, self->P));
-        hsep_planner_complete(self, 0, self->jerk_weight);
-    } else {
-        memcpy(hsep_at(self, self->P), gram, (size_t)hsep_triangle(splines->n) * sizeof(hsep_real));
-        hsep_splines_add_jerk(splines, self->jerk_weight, hsep_at(self, self->third), 0, NULL, v);
-    }
+    hsep_splines_filtered_gram(splines, filtered, hsep_at(self, self->P));
+    hsep_planner_complete(self, self->jerk_weight);
 }
 
-HSEP_API void hsep_planner_gram(
-    hsep_planner *self, const hsep_real filtered[], const hsep_real weights[], hsep_real gram[])
-{
-    const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int n = splines->n, spacing = splines->spacing, preview = splines->preview;
-    hsep_real *P = hsep_at(self, self->P);
-    for (hsep_int i = 0; i < n; i++) {
-        for (hsep_int j = i; j < n; j++) {
-            hsep_real sum = 0.0;
-            for (hsep_int k = j * spacing; k < preview; k++) {
-                sum += (weights[k] * filtered[k - i * spacing]) * (weights[k] * filtered[k - j * spacing]);
-            }
-            *P++ = sum;
-        }
-    }
-    hsep_planner_complete(self, 0, self->jerk_weight);
-    memcpy(gram, hsep_at(self, self->P), (size_t)hsep_triangle(n) * sizeof(hsep_real));
-}
-
-HSEP_API void hsep_planner_pin(hsep_planner *self)
+/* Reduce the cost to the splines that are not pinned: v := v_2 - P_21 pinned. */
+static void planner_pin(hsep_planner *self)
 {
     const hsep_int n = hsep_planner_splines(self)->n, first = self->n_pinned;
     const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED, *P = hsep_at(self, self->P);
     hsep_real *v = hsep_planner_linear(self);
-    /* v := v_2 - P_21 pinned */
+    self->solved = hsep_knots_of(n - first, 0);
     for (hsep_int i = 0; i < first; i++) {
         for (hsep_int j = first; j < n; j++) {
             v[j] -= P[j - i] * rest[i];
@@ -266,35 +272,46 @@ HSEP_API void hsep_planner_pin(hsep_planner *self)
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_real *b = hsep_splines_shape(splines), *c = hsep_at(self, self->c);
-    const hsep_int n = splines->n, spacing = splines->spacing, width = 4 * spacing;
-    hsep_real *P = hsep_at(self, self->P), *v = hsep_planner_linear(self);
+    const hsep_problem problem = planner_problem(self);
+    const hsep_real *b = hsep_splines_shape(splines);
+    const hsep_int spacing = splines->spacing, width = 4 * spacing, first = self->n_pinned, n = splines->n - first;
+    hsep_real *P = hsep_planner_quadratic(self), *delta = problem.low;
     self->change = 1.0;
     hsep_planner_open(self, x_d);
-    for (hsep_int i = 0; i < n; i++) { /* products of splines; v: less what is decided, times each */
-        for (hsep_int j = i; j < n; j++) {
-            const hsep_int apart = (j - i) * spacing;
-            *P++ = apart < width ? hsep_dot(b, b + apart, width - apart) : 0.0;
+    hsep_planner_change(self);
+    self->solved = hsep_knots_of(n, 0);
+    for (hsep_int k = 0; k < splines->preview; k++) {
+        delta[k] = hsep_planner_delta(self, k);
+    }
+    for (hsep_int i = 0; i < n; i++) { /* products of splines, and of each with what there is */
+        for (hsep_int d = 0; d < n - i; d++) {
+            *P++ = d < 4 ? hsep_dot(b, b + d * spacing, width - d * spacing) : 0.0;
         }
-        v[i] = 0.0;
-        for (hsep_int k = i * spacing; k < HSEP_N_DECIDED * spacing; k++) {
-            v[i] -= b[k - i * spacing] * hsep_splines_sum(splines, c, HSEP_N_DECIDED, k);
-        }
+        problem.v[i] = -hsep_dot(b, delta + (first + i) * spacing, width);
     }
     const hsep_real gain = 2.0 * hsep_sin(0.5 * HSEP_TWO_PI * HSEP_PLANNING_ENDS / (hsep_real)splines->preview);
-    hsep_planner_complete(self, 0, hsep_pow(gain, -6.0)); /* gain of a difference at that period */
-    for (hsep_int i = n - self->Np / spacing; i < n; i++) {
-        *hsep_planner_quadratic(self, i) *= HSEP_PLANNING_NEW;
+    hsep_planner_complete(self, hsep_pow(gain, -6.0)); /* gain of a difference at that period */
+    const hsep_int unknown = self->Np / spacing;
+    for (hsep_int i = n > unknown ? n - unknown : 0; i < n; i++) {
+        hsep_planner_quadratic(self)[i * n - i * (i - 1) / 2] *= HSEP_PLANNING_NEW;
     }
-    hsep_planner_pin(self);
 }
 
-HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)
+HSEP_API int hsep_planner_factor(hsep_planner *self)
 {
-    const hsep_int first = pinned ? self->n_pinned : 0, n = hsep_planner_splines(self)->n - first;
+    const hsep_int m = self->solved.m;
     hsep_real *factor = hsep_at(self, self->factor);
-    memcpy(factor, hsep_planner_quadratic(self, first), (size_t)hsep_triangle(n) * sizeof(hsep_real));
-    return hsep_cholesky_rows(factor, n, 0, n, NULL);
+    memcpy(factor, planner_triangle(self), (size_t)hsep_triangle(m) * sizeof(hsep_real));
+    return hsep_cholesky_rows(factor, m, 0, m, NULL);
+}
+
+/* The remainder of the last plan as this cost counts, (m,), m: no change of it, or what it is. */
+static void planner_start(hsep_planner *self, hsep_real x[])
+{
+    const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self);
+    for (hsep_int j = 0; j < self->solved.m; j++) {
+        x[j] = self->changes ? 0.0 : rest[j];
+    }
 }
 
 /* Begin a bounded plan at this cost, from the remainder of the last plan. The pinned samples stay as they are, and its
@@ -302,12 +319,12 @@ HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned)
 static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_tolerance *tolerance)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int first = self->n_pinned, preview = splines->preview;
-    const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED, *total = hsep_at(self, self->total);
-    hsep_interior *interior = planner_interior(self);
-    const hsep_problem problem = hsep_interior_problem(interior, splines);
+    const hsep_int preview = splines->preview;
+    const hsep_real *total = hsep_at(self, self->total);
+    const hsep_problem problem = planner_problem(self);
     hsep_real *low = problem.low, *high = problem.high;
-    hsep_splines_rows(splines, rest + first, first, low);
+    planner_start(self, problem.x);
+    planner_rows(self, problem.x, low);
     for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
         const hsep_real other = total[r] - low[r];
         hsep_real least, most;
@@ -315,47 +332,53 @@ static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_toleran
         low[r] = least - other + tolerance->margin;
         high[r] = most - other - tolerance->margin;
     }
-    memcpy(problem.x, rest + first, (size_t)(splines->n - first) * sizeof(hsep_real));
-    hsep_interior_begin(interior, splines, hsep_planner_quadratic(self, first), first, cost, tolerance);
+    hsep_interior_begin(planner_interior(self), splines, &self->solved, planner_triangle(self), cost, tolerance);
 }
 
-HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance)
+/* Change the remainder of the last plan by a step x, (m,), m, of this cost. */
+static void planner_take(hsep_planner *self, const hsep_real x[])
 {
-    const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int first = pinned ? self->n_pinned : 0, n = splines->n - first;
-    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + first;
-    const hsep_real *row = hsep_planner_quadratic(self, first), *factor = hsep_at(self, self->factor);
-    const hsep_problem problem = hsep_interior_problem(planner_interior(self), splines);
-    hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low; /* work */
+    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self), *c = planner_problem(self).c;
+    hsep_knots_widen(&self->solved, x, c);
+    for (hsep_int j = 0; j < self->solved.n; j++) {
+        rest[j] += c[j];
+    }
+}
+
+HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance)
+{
+    const hsep_int n = self->solved.m;
+    const hsep_real *row = planner_triangle(self), *factor = hsep_at(self, self->factor);
+    const hsep_problem problem = planner_problem(self);
+    hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low, *start = problem.high; /* work */
 
     memcpy(free_minimum, v, (size_t)n * sizeof(hsep_real));
     hsep_cholesky_solve(factor, n, free_minimum);
+    planner_start(self, start);
     hsep_real cost = 0.0, finite = 0.0;
     for (hsep_int j = 0; j < n; j++) {
         cost += v[j] * free_minimum[j];
         finite += hsep_fabs(free_minimum[j]);
-        free_minimum[j] -= rest[j]; /* the way there */
+        free_minimum[j] -= start[j]; /* the way there */
     }
     if (!isfinite(finite)) {
         return HSEP_PLAN_FAILED;
     }
-    hsep_splines_rows(splines, free_minimum, first, rows);
+    planner_rows(self, free_minimum, rows);
     if (planner_allow(self, rows)) {
-        for (hsep_int j = 0; j < n; j++) {
-            rest[j] += free_minimum[j];
-        }
+        planner_take(self, free_minimum);
         return HSEP_PLAN_DONE;
     }
-    for (hsep_int i = 0; i < n; i++) { /* cost += rest' P rest */
-        hsep_real sum = 0.5 * row[0] * rest[i];
+    for (hsep_int i = 0; i < n; i++) { /* cost += start' P start */
+        hsep_real sum = 0.5 * row[0] * start[i];
         for (hsep_int j = 1; j < n - i; j++) {
-            sum += row[j] * rest[i + j];
+            sum += row[j] * start[i + j];
         }
-        cost += 2.0 * rest[i] * sum;
+        cost += 2.0 * start[i] * sum;
         row += n - i;
     }
-    if (!pinned) {
-        hsep_planner_pin(self);
+    if (!self->changes) {
+        planner_pin(self);
     }
     planner_bound(self, cost, tolerance);
     return HSEP_PLAN_BOUNDED;
@@ -363,30 +386,26 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, con
 
 HSEP_API int hsep_planner_advance(hsep_planner *self)
 {
-    const hsep_splines *splines = hsep_planner_splines(self);
-    hsep_interior *interior = planner_interior(self);
-    if (!hsep_interior_advance(interior, splines, hsep_planner_quadratic(self, self->n_pinned))) {
+    if (!hsep_interior_advance(planner_interior(self), hsep_planner_splines(self), planner_triangle(self))) {
         return 0;
     }
-    const hsep_problem problem = hsep_interior_problem(interior, splines);
-    hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high;
-    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + self->n_pinned;
-    const hsep_real *inner = problem.inner != NULL ? problem.inner : rest;
-    const hsep_int n = splines->n - self->n_pinned;
-    hsep_real finite = 0.0;
-    for (hsep_int j = 0; j < n; j++) {
-        at[j] = inner[j] - rest[j];
-        way[j] -= inner[j];
+    const hsep_problem problem = planner_problem(self);
+    hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high, finite = 0.0;
+    planner_start(self, at);
+    for (hsep_int j = 0; j < self->solved.m; j++) {
+        const hsep_real inner = problem.inner != NULL ? problem.inner[j] : at[j];
+        at[j] = inner - at[j];
+        way[j] -= inner;
         finite += hsep_fabs(way[j]);
     }
-    if (isfinite(finite)) { /* bounds that are exceeded, as steps are limited, are so by little */
-        hsep_splines_rows(splines, way, self->n_pinned, rows);
-        hsep_splines_rows(splines, at, self->n_pinned, from);
-        const hsep_real share = planner_share(self, from, rows);
-        for (hsep_int j = 0; j < n; j++) {
-            rest[j] += at[j] + share * way[j];
-        }
+    planner_rows(self, way, rows);
+    planner_rows(self, at, from);
+    const hsep_real share = planner_share(self, from, rows);
+    for (hsep_int j = 0; j < self->solved.m;
+         j++) { /* bounds that are exceeded, as steps are limited, are so by little */
+        way[j] = isfinite(finite) ? at[j] + share * way[j] : 0.0;
     }
+    planner_take(self, way);
     return 1;
 }
 

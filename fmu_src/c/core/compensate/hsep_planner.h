@@ -25,12 +25,14 @@ typedef struct {
     hsep_real limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
     int no_reversal;              /* whether x_dm keeps the direction of x_d */
     hsep_int pinned;              /* samples that follow the last plan, or Np / 2 if less */
+    int averaged;                 /* whether plans are changes of the last one, by wider splines behind two windows */
 } hsep_planner_parameters;
 
 typedef struct {
     hsep_int Np;
     hsep_int n_pinned; /* splines of a bounded plan that stay as they were */
     hsep_int no_reversal;
+    hsep_int changes; /* whether the cost is of a change of the last plan; otherwise it is of a plan */
     hsep_real jerk_weight;
     hsep_real change;                         /* share of the limit of |delta| that bounds it */
     hsep_real delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
@@ -39,14 +41,16 @@ typedef struct {
     hsep_int total;  /* (4 preview,) rows of x_dm under the remainder of the last plan, in shares */
     hsep_int own;    /* (4 preview,) rows of x_d where one nearby exceeds its limit, else 0; order 0: 0 */
     hsep_int moves;  /* (preview,) which way x_d moves: -1, 0, 1; 0 where that does not matter */
-    hsep_int third;  /* (preview,) m, third differences of what is decided */
+    hsep_int third;  /* (preview,) m, third differences of what the cost begins with */
     hsep_int P;      /* triangle of n rows */
     hsep_int factor; /* triangle of n rows */
     hsep_int splines, interior;
-    hsep_int stop; /* of plans that are longer than what is known; 0: none is */
+    hsep_knots knots;  /* that a change of the last plan is solved for, */
+    hsep_knots solved; /* and those of this cost */
+    hsep_int stop;     /* of plans that are longer than what is known; 0: none is */
 } hsep_planner;
 
-HSEP_ASSERT_WORDS(hsep_planner, 21);
+HSEP_ASSERT_WORDS(hsep_planner, 40);
 
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
@@ -86,47 +90,36 @@ static inline hsep_int hsep_planner_pinned(const hsep_planner *self)
 /* Begin plans of a window. x_d: commanded positions, m, (preview,). */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
 
-/* Let plans of this window turn where no_reversal forbids it, as their model follows the friction, and count the pinned
- * splines as decided. */
+/* Let plans of this window turn where no_reversal forbids it, as their model follows the friction. */
 HSEP_API void hsep_planner_follow_friction(hsep_planner *self);
 
-/* Set the cost: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the model,
- * (preview,); target: x_d minus the model's response to x_d plus the decided part of delta, m, (preview,). gram: of
- * hsep_planner_gram, to whose weights' squares the target is multiplied; NULL: every sample counts alike. Cost:
- * n preview / 2 multiply-adds, twice of it without a gram. */
-HSEP_API void hsep_planner_aim(
-    hsep_planner *self, const hsep_real gram[], const hsep_real filtered[], const hsep_real target[]);
+/* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the
+ * model, (preview,); target: x_d minus the model's response to x_d plus the decided part of delta, m, (preview,). Cost:
+ * n preview multiply-adds. */
+HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
 
-/* The quadratic part of that cost with weights of the errors, (preview,), a triangle of n rows, before the first plan.
- * Cost: n^2 preview / 4 multiply-adds. */
-HSEP_API void hsep_planner_gram(
-    hsep_planner *self, const hsep_real filtered[], const hsep_real weights[], hsep_real gram[]);
-
-/* Reduce that cost to the splines that are not pinned. */
-HSEP_API void hsep_planner_pin(hsep_planner *self);
-
-/* Open a plan that ends compensation, with the cost of the splines that are not pinned: of delta itself, and of its
- * jerk, which makes it as smooth as a short part of a plan allows. It ends where the last plan does. x_d: as
- * hsep_planner_open has it. Cost: n^2 / 2 and 15 preview multiply-adds, and those of hsep_planner_pin. */
+/* Open a change of the last plan that ends compensation, with the cost of delta itself, and of its jerk, which makes it
+ * as smooth as a short part of a plan allows. It ends where the last plan does. x_d: as hsep_planner_open has it. Cost:
+ * 30 n spacing and 15 preview multiply-adds, and those of hsep_knots_add. */
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
 
-/* The cost 1/2 c' P c - v' c of the splines first ... n - 1, for a caller that sets it itself: the triangle P of n -
- * first rows, and v, (n - first,), m; hsep_planner_complete adds the jerk's, times a weight, and makes P positive
- * definite. */
-static inline hsep_real *hsep_planner_quadratic(hsep_planner *self, hsep_int first)
-{
-    return hsep_at(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
-}
+/* Begin a cost 1/2 x' P x - v' x of a change of the last plan by the splines of the planner's knots, which the caller
+ * sets: the triangle P of m rows, and v, (m,), m; hsep_planner_complete adds the jerk's, times a weight, to v, and to P
+ * with what makes it positive definite. */
+HSEP_API void hsep_planner_change(hsep_planner *self);
+static inline hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
-HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_int first, hsep_real jerk_weight);
+HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight);
 
-/* Begin to plan at this cost; return whether it has a minimum. pinned: as below. Cost: n^3 / 6 multiply-adds. */
-HSEP_API int hsep_planner_factor(hsep_planner *self, int pinned);
+/* Begin to plan at this cost; return whether it has a minimum. Cost: m^3 / 6 multiply-adds. */
+HSEP_API int hsep_planner_factor(hsep_planner *self);
 
-/* Plan at this cost, which is used up. pinned: whether the first samples (hsep_planner_pinned) stay as they are in
- * every plan, and the cost is of the other splines alone; otherwise they stay in a bounded plan only. A bounded plan is
- * solved within the tolerance. */
-HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, int pinned, const hsep_tolerance *tolerance);
+/* Plan at this cost, which is used up. The first samples (hsep_planner_pinned) stay as they are in a change of the last
+ * plan, and in a bounded plan, which is solved within the tolerance. */
+HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance);
+
+/* The change that was found last, (m,), m. */
+HSEP_API const hsep_real *hsep_planner_found(hsep_planner *self);
 
 /* Do a part of a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
 HSEP_API int hsep_planner_advance(hsep_planner *self);

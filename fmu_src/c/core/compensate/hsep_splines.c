@@ -201,8 +201,15 @@ static void splines_products(
     to[0] = s0, to[1] = s1, to[2] = s2, to[3] = s3;
 }
 
+/* Set the product of spline i with i + d. */
+static inline void splines_product(hsep_real products[], hsep_int i, hsep_int d, hsep_real value)
+{
+    products[HSEP_KNOTS_WIDTH * i + HSEP_KNOTS_NEAR + d] = value;
+    products[HSEP_KNOTS_WIDTH * (i + d) + HSEP_KNOTS_NEAR - d] = value;
+}
+
 HSEP_API void hsep_splines_gram(
-    const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real triangle[], hsep_real work[])
+    const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real products[], hsep_real work[])
 {
     const hsep_int n = self->n - first;
     hsep_real sums[HSEP_SPLINES_TOGETHER], *sorted = work; /* rows that are spacing apart become neighbours */
@@ -213,15 +220,14 @@ HSEP_API void hsep_splines_gram(
             }
         }
     }
+    memset(products, 0, (size_t)(HSEP_KNOTS_WIDTH * n) * sizeof(hsep_real));
     for (hsep_int d = 0; d < n && d * self->spacing + 1 < splines_length(self, HSEP_ORDERS - 1); d++) {
-        hsep_real *entry = triangle + d;
         for (hsep_int i = 0; i + d < n; i++) {
             const hsep_int within = i % HSEP_SPLINES_TOGETHER;
             if (within == 0) {
                 splines_products(self, work, first + i, d, sums);
             }
-            *entry += sums[within];
-            entry += n - i;
+            splines_product(products, i, d, sums[within]);
         }
     }
 }
@@ -258,23 +264,24 @@ HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_re
     }
 }
 
-HSEP_API void hsep_splines_add_jerk(
-    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real triangle[],
-    hsep_real v[])
+HSEP_API void hsep_splines_jerk(
+    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real products[],
+    hsep_real g[])
 {
     const hsep_real *e = splines_differences(self, 3);
     const hsep_int n = self->n - first, length = splines_length(self, 3);
     const hsep_real unit = 1.0 / self->share[3], of_third = weight / self->share[3];
-    for (hsep_int d = 0; triangle != NULL && d < n && d * self->spacing + 1 < length; d++) {
+    memset(products, 0, (size_t)(HSEP_KNOTS_WIDTH * n) * sizeof(hsep_real));
+    for (hsep_int d = 0; d < n && d * self->spacing + 1 < length; d++) {
         hsep_real sum = 0.0;
         for (hsep_int k = d * self->spacing + 1; k < length; k++) {
             sum += (e[k] * unit) * (e[k - d * self->spacing] * unit);
         }
         for (hsep_int i = 0; i + d < n; i++) {
-            *splines_entry(triangle, n, i, i + d) += weight * sum;
+            splines_product(products, i, d, weight * sum);
         }
     }
     for (hsep_int j = first; j < self->n; j++) {
-        v[j - first] -= of_third * hsep_dot(e + 1, third + j * self->spacing + 1, length - 1);
+        g[j - first] = -(of_third * hsep_dot(e + 1, third + j * self->spacing + 1, length - 1));
     }
 }

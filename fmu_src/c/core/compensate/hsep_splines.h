@@ -10,6 +10,7 @@
 #ifndef HSEP_SPLINES_H
 #define HSEP_SPLINES_H
 
+#include "hsep_knots.h"
 #include "hsep_layout.h"
 #include "hsep_plan_constants.h"
 #include "hsep_vector.h"
@@ -68,11 +69,11 @@ HSEP_API void hsep_splines_exceeded(
  * used up. Cost: 9 operations a sample, and 4 preview multiply-adds. */
 HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[]);
 
-/* The triangle of n - first rows += A' diag(weights) A, A being the matrix of hsep_splines_rows. work: (4 preview +
+/* The products A' diag(weights) A (hsep_knots_add), A being the matrix of hsep_splines_rows. work: (4 preview +
  * 4 HSEP_LANES_MOST,), of which the last ones are read beside others. Cost: 40 spacing multiply-adds for each of these
  * splines. */
 HSEP_API void hsep_splines_gram(
-    const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real triangle[], hsep_real work[]);
+    const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real products[], hsep_real work[]);
 
 /* The sum of squares of a spline's rows: the largest entry on the diagonal of A' A. */
 HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self);
@@ -81,11 +82,11 @@ HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self);
  * each shifted by one spacing more. Each diagonal is a running sum: n preview / 2 multiply-adds. */
 HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[]);
 
-/* The triangle of n - first rows += weight D' D, and v, (n - first,), -= weight D' third, with the third differences D
- * of the splines first ... n - 1, m; third: (preview,) m. The triangle may be NULL. */
-HSEP_API void hsep_splines_add_jerk(
-    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real triangle[],
-    hsep_real v[]);
+/* The products weight D' D, and g, (n - first,), := -weight D' third, with the third differences D of the splines first ...
+ * n - 1, m; third: (preview,) m. */
+HSEP_API void hsep_splines_jerk(
+    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real products[],
+    hsep_real g[]);
 
 /* The spline itself, b, (4 spacing,). */
 static inline const hsep_real *hsep_splines_shape(const hsep_splines *self) { return hsep_at_const(self, self->shape); }
