@@ -29,11 +29,11 @@ HSEP_API void hsep_residual_init(
 /* The implementation; NULL if it is the other one. */
 static inline hsep_paper *hsep_residual_paper(hsep_residual_model *self)
 {
-    return self->paper ? (hsep_paper *)hsep_at(self, self->paper) : NULL;
+    return self->paper ? hsep_part(self, self->paper) : NULL;
 }
 static inline hsep_averaged *hsep_residual_averaged(hsep_residual_model *self)
 {
-    return self->averaged ? (hsep_averaged *)hsep_at(self, self->averaged) : NULL;
+    return self->averaged ? hsep_part(self, self->averaged) : NULL;
 }
 
 /* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of
@@ -98,7 +98,7 @@ static inline const hsep_real *hsep_residual_accepted(hsep_residual_model *self)
 /* Measurements of this run that were missing or not plausible. */
 static inline hsep_int hsep_residual_n_rejected(const hsep_residual_model *self)
 {
-    return self->averaged ? ((const hsep_averaged *)hsep_at_const(self, self->averaged))->n_rejected : 0;
+    return self->averaged ? ((const hsep_averaged *)hsep_part_const(self, self->averaged))->n_rejected : 0;
 }
 
 #endif
