@@ -106,13 +106,13 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, h
     const hsep_real x_d = hsep_at(self, self->x_d - late)[i], x_pb = hsep_at(self, self->x_pb - late)[i];
     const hsep_real x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
-    hsep_residual_append_command(hsep_predictor_model(self), x_d_ahead - self->start);
     hsep_at(self, self->past_e)[j] = learned - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
     const hsep_residual_window window = hsep_predictor_window(self);
     const hsep_residual_sample sample = {
         .i = i,
         .settled = predictor_settled(self),
         .relative = learned - self->start,
+        .command = x_d_ahead - self->start,
         .x = hsep_at(self, self->past_x) + j,
         .e = hsep_at(self, self->past_e) + j};
     hsep_residual_take_in(hsep_predictor_model(self), &window, &sample);

@@ -60,9 +60,6 @@ HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
 /* Begin a run with what an earlier one has learned, once it is loaded into a fresh block. */
 HSEP_API void hsep_residual_restart(hsep_residual_model *self);
 
-/* Take in the command that comes next, as it came, m, relative to the start. */
-HSEP_API void hsep_residual_append_command(hsep_residual_model *self, hsep_real command);
-
 /* Begin a window whose residuals before it are known. learning: whether it is learned. */
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning);
 
