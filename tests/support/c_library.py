@@ -2,7 +2,6 @@
 
 import ctypes
 import os
-import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -12,6 +11,7 @@ from typing import Any
 from built_once import built_once, shared_builds
 from c_compiler import C_SOURCES
 from c_core import library as core_library
+from programs import output_of
 from stream import STAGE_COMPENSATOR
 
 from hybridsep.base.parameters import Parameter
@@ -23,15 +23,7 @@ STRICT = "-Wall -Wextra -Wconversion -pedantic -Werror"
 def cmake(*arguments: str | Path) -> str:
     """Run the package's cmake, a dependency of the tests, on Ninja; return what it printed."""
     environment = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])}
-    done = subprocess.run(
-        [sys.executable, "-m", "cmake", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=environment,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    return output_of(sys.executable, "-m", "cmake", *arguments, env=environment)
 
 
 def configured(source: Path, folder: Path, *definitions: str) -> None:
