@@ -169,9 +169,9 @@ static double *learned_put(double to[], const hsep_real from[], hsep_int n)
 }
 
 HSEP_API size_t
-hsep_learned_write(hsep_predictor *predictor, const hsep_parameters *parameters, void *bytes, size_t size)
+hsep_predictor_weights(hsep_predictor *self, const hsep_parameters *parameters, void *bytes, size_t size)
 {
-    hsep_residual_model *model = hsep_predictor_model(predictor);
+    hsep_residual_model *model = hsep_predictor_model(self);
     const hsep_int n_learned = hsep_residual_n_learned(model);
     hsep_learned_head head = {{0}, learned_n_settings(parameters), parameters->n_modes, HSEP_N_UNCERTAINTY + n_learned};
     memcpy(head.magic, HSEP_LEARNED_MAGIC, sizeof head.magic);
@@ -190,7 +190,7 @@ hsep_learned_write(hsep_predictor *predictor, const hsep_parameters *parameters,
         setting += learned_settings(parameters, mode, setting);
     }
     double *to = learned_put((double *)(void *)setting, hsep_residual_learned(model), n_learned);
-    to = learned_put(to, hsep_predictor_uncertainty(predictor)->theta, HSEP_N_UNCERTAINTY);
+    to = learned_put(to, hsep_predictor_uncertainty(self)->theta, HSEP_N_UNCERTAINTY);
     for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
         const hsep_int count = (hsep_int)hsep_triangle(hsep_residual_n_features(model, i) + 1);
         hsep_real *triangle = (hsep_real *)(void *)(to + 1 + count) - count; /* at the end of where it goes */
