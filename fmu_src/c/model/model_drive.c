@@ -90,7 +90,7 @@ static hsep_status drive_check(const hsep_context *context, const double values[
 {
     const hsep_mode *modes = hsep_table_modes(context, values);
     const hsep_stage_settings settings = stage_settings(values);
-    *bytes = hsep_stage_size(context->n_modes, &settings);
+    *bytes = hsep_stage_lay_out(&(hsep_stage){0}, context->n_modes, &settings);
     for (size_t i = 0; i < context->n_modes; i++) {
         const double rate = hsep_plant_mode_rate(&modes[i]);
         if (rate > HSEP_PLANT_RATE_MAX) {
