@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TypeVar
 
 import numpy as np
-from c_library import AveragingPart, Mode, PredictorPart
+from c_library import PARTS as SETTINGS
+from c_library import Mode
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
@@ -38,8 +38,8 @@ _DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 class _Parameters(ctypes.Structure):
     _fields_ = (
-        ("settings", PredictorPart),
-        ("averaging", AveragingPart),
+        ("settings", SETTINGS["predictor"]),
+        ("averaging", SETTINGS["averaging"]),
         ("preview", ctypes.c_uint64),
         ("horizon", ctypes.c_uint64),
         ("n_init", ctypes.c_double),
@@ -51,9 +51,6 @@ class _Parameters(ctypes.Structure):
 
 class _Run(ctypes.Structure):
     _fields_ = (("n", ctypes.c_uint64), *((name, _DOUBLES) for name in ("x_d", "x", "x_h", "std")))
-
-
-_Filled = TypeVar("_Filled", PredictorPart, AveragingPart)
 
 
 class CoreVariant:
@@ -104,8 +101,8 @@ class CoreVariant:
         fmi = {**settings.to_fmi(), "dead_time": model.dead_time, "averaging": 1}
         modes = (Mode * len(model.modes))(*(Mode(one.f_n, one.zeta, one.alpha, one.beta) for one in model.modes))
         parameters = _Parameters(
-            _filled(PredictorPart, fmi),
-            _filled(AveragingPart, fmi),
+            _filled(SETTINGS["predictor"], fmi),
+            _filled(SETTINGS["averaging"], fmi),
             settings.Np,
             settings.Np,
             float(settings.Np),
@@ -124,7 +121,7 @@ class CoreVariant:
         return (cold, of_cold), (warm, of_warm)
 
 
-def _filled(kind: type[_Filled], values: Mapping[str, float]) -> _Filled:
+def _filled(kind: type[ctypes.Structure], values: Mapping[str, float]) -> ctypes.Structure:
     """Return a struct with its values, whole numbers where it has them."""
     types = {field[0]: int if field[1] is ctypes.c_uint64 else float for field in kind._fields_}
     return kind(**{name: of(values[name]) for name, of in types.items()})

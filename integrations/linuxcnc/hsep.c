@@ -458,6 +458,7 @@ static int axis_open(axis_data *self, const char *folder)
     /* Plans end with the preview: a change has to be over where a command is too fast, which is seen that far ahead */
     *axis_value(self, HSEP_VR_horizon) = 0.0;
 #endif
+    axis_message[0] = '\0'; /* of opening */
     if (hsep_instance_initialise(instance, "loadrt " HSEP_COMPONENT, axis_message) == HSEP_REFUSED) {
         rtapi_print_msg(RTAPI_MSG_ERR, HSEP_COMPONENT ".%s: %s\n", name, axis_message);
         return 0;

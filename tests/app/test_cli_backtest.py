@@ -43,8 +43,7 @@ def test_figures(hybridsep: Run, tmp_path: Path, suffix: str) -> None:
     drawn = []
     for t_init in (0.0, 0.3, 0.0) if suffix == ".svg" else (0.0,):
         options = (*predictor(t_init=t_init), "--figure", figure, "--force")
-        status, out, err = hybridsep("backtest", log, *MACHINE, *options)
-        assert status == 0, err
+        out = hybridsep.done("backtest", log, *MACHINE, *options)
         assert out.splitlines()[-1] == f"wrote {figure}"
         drawn.append(figure.read_bytes())
     assert all(one.startswith((b"\x89PNG\r", b"<?xml")) for one in drawn)
@@ -67,8 +66,7 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
     warm = json.loads(hybridsep("backtest", log, *MACHINE, "--weights", state, "--json")[1])
     assert warm["rms_h_um"] < 0.8 * cold["rms_h_um"]
     assert warm["rms_pb_um"] == pytest.approx(cold["rms_pb_um"], rel=1e-12)
-    status, _, err = hybridsep("backtest", log, *MACHINE, "--weights", state, *predictor(p=20))
-    assert status == 2
+    err = hybridsep.refused("backtest", log, *MACHINE, "--weights", state, *predictor(p=20))
     assert "my.state was not trained for machine spring_mass_damper: it has p = 50 instead of 20" in err
 
 
@@ -76,11 +74,9 @@ def test_saved_state_and_predictions(hybridsep: Run, tmp_path: Path) -> None:
 def test_brackets_are_text(hybridsep: Run, tmp_path: Path) -> None:
     """Brackets of a name are no markup: not in titles and cells, not in notes and errors."""
     log = write_log(tmp_path / "x[b]axis[red].csv", n=1000)
-    status, out, err = hybridsep("backtest", log, *MACHINE)
-    assert status == 0, err
+    out = hybridsep.done("backtest", log, *MACHINE)
     assert "x[b]axis[red].csv: prediction error against" in " ".join(out.split())
-    status, _, err = hybridsep("backtest", log, *MACHINE, "--x", "[bold]")
-    assert status == 2
+    err = hybridsep.refused("backtest", log, *MACHINE, "--x", "[bold]")
     assert "x[b]axis[red].csv" in err
     assert "[bold]" in err
 
@@ -97,17 +93,15 @@ def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:
     np.savetxt(log, columns, delimiter=",", header="t,x_d [deg],angle [deg]", comments="", fmt="%.17g")
     assert read_log(log, columns={"x": "angle"}).unit == "rad"
     expected = json.loads(hybridsep("backtest", write_log(tmp_path / "m.csv"), "-m", linear, "--json")[1])
-    status, out, _ = hybridsep("backtest", log, "-m", rotary, "--json")
-    assert status == 0
+    out = hybridsep.done("backtest", log, "-m", rotary, "--json")
     assert json.loads(out)["rms_h_urad"] == pytest.approx(expected["rms_h_um"], rel=1e-6)
     shown = hybridsep("backtest", log, "-m", rotary)[1]
     assert "RMS [mdeg]" in shown
     assert "rad" not in shown
     # Where nothing is stated, the positions are in the machine's unit.
-    status, out, _ = hybridsep("backtest", tmp_path / "m.csv", "-m", linear, "--set", "unit=rad", "--json")
+    out = hybridsep.done("backtest", tmp_path / "m.csv", "-m", linear, "--set", "unit=rad", "--json")
     assert json.loads(out)["rms_h_urad"] == pytest.approx(expected["rms_h_um"], rel=1e-9)
-    status, _, err = hybridsep("backtest", log, "-m", linear, "--x", "angle")
-    assert status == 2
+    err = hybridsep.refused("backtest", log, "-m", linear, "--x", "angle")
     assert "log.csv is in rad, but machine emps has unit = 'm'; correct the machine file, or say" in err
 
 
@@ -121,8 +115,7 @@ def test_the_page_has_the_figures_of_backtest(hybridsep: Run, log: Path, tmp_pat
     page = tmp_path / "page.html"
     options = (log, *MACHINE, *predictor(Np=50))
     scores = json.loads(hybridsep("backtest", *options, "--json")[1])
-    status, out, err = hybridsep("backtest", *options, "--report", page)
-    assert status == 0, err
+    out = hybridsep.done("backtest", *options, "--report", page)
     assert f"wrote {page}" in out
     assert f"{scores['rms_h_um']:.4g}" in out
     assert " ".join(scores["verdict"].split()) in " ".join(out.split())
@@ -145,8 +138,7 @@ def test_what_a_controller_says_is_printed_and_written(hybridsep: Run, tmp_path:
     log.write_text(f"DES_POS|1,CTRL_POS|1,ENC_POS|1,CTRL_DIFF|1\n{text}")
     replayed = ("backtest", log, *MACHINE, "--T_s", "0.001", "--unit", "m")
     assert json.loads(hybridsep(*replayed, "--json")[1])["controller"]["look_ahead"] == 5
-    status, out, err = hybridsep(*replayed, "--report", page)
-    assert status == 0, err
+    out = hybridsep.done(*replayed, "--report", page)
     for shown in (out, page.read_text(encoding="utf-8")):
         assert "What the controller says of itself" in shown
         assert "leads the command of the position loop (CTRL_POS) by 5 samples (5 ms)" in shown
@@ -155,15 +147,13 @@ def test_what_a_controller_says_is_printed_and_written(hybridsep: Run, tmp_path:
 @pytest.mark.slow
 def test_a_warm_start_is_said(hybridsep: Run, log: Path, tmp_path: Path) -> None:
     saved = tmp_path / "learned.state"
-    assert hybridsep("backtest", log, *MACHINE, "--save", saved)[0] == 0
+    hybridsep.done("backtest", log, *MACHINE, "--save", saved)
     warm = (*MACHINE, "--weights", saved, "--report")
-    status, out, err = hybridsep("backtest", log, *warm, tmp_path / "page.html")
-    assert status == 0, err
+    out = hybridsep.done("backtest", log, *warm, tmp_path / "page.html")
     known = "Nothing is tested: the saved predictor was trained with this log, and knows it"
     assert known in out
     assert known in (tmp_path / "page.html").read_text(encoding="utf-8")
     other = write_rows(tmp_path / "other.csv", commanded(), measured(1))
-    status, out, err = hybridsep("backtest", other, *warm, tmp_path / "other.html")
-    assert status == 0, err
+    out = hybridsep.done("backtest", other, *warm, tmp_path / "other.html")
     assert "Use the hybrid: its error is 0." in out
     assert "began with what an earlier run had learned" in (tmp_path / "other.html").read_text(encoding="utf-8")

@@ -35,8 +35,7 @@ def command_file(folder: Path) -> Path:
 
 def refusal(run: Run, *arguments: object) -> str:
     """Run a command that must be refused with one line; return it without line breaks."""
-    status, out, err = run(*arguments)
-    assert (status, out) == (2, ""), err
+    err = run.refused(*arguments)
     assert err.startswith("error: ")
     assert len(err.strip().splitlines()) == 1
     return err.strip()
@@ -103,7 +102,7 @@ def test_an_existing_file_needs_force(hybridsep: Run, tmp_path: Path, log: Path,
     assert f"{there} exists; choose another name, or overwrite it with --force" in refusal(hybridsep, *words)
     assert (there.read_text(), list(folder.iterdir())) == ("my own", [there])
     if arguments[0] in ("backtest", "init"):
-        assert hybridsep(*words, "--force")[0] == 0
+        hybridsep.done(*words, "--force")
         assert there.read_text(encoding="utf-8") != "my own"
 
 
@@ -113,7 +112,7 @@ def test_a_later_fit_of_a_log_replaces_its_files_and_no_others(hybridsep: Run, t
     out = tmp_path / "axis"
     arguments = ("fit", log, "--Np", 50, "--out", out)
     for _ in range(2):
-        assert hybridsep(*arguments)[0] == 0
+        hybridsep.done(*arguments)
     (other := log.with_name("other.csv")).write_bytes(log.read_bytes())
     assert "machine.toml exists" in refusal(hybridsep, "fit", other, *arguments[2:])
     machine = out / "machine.toml"
@@ -262,7 +261,7 @@ def test_weights_that_are_none_are_refused_before_a_loop_is_run(
 
 def test_a_log_that_ends_badly_costs_no_result(hybridsep: Run, tmp_path: Path, log: Path) -> None:
     out = tmp_path / "run.csv"
-    assert hybridsep("backtest", log, "-m", MACHINE, "--save", out)[0] == 0
+    hybridsep.done("backtest", log, "-m", MACHINE, "--save", out)
     before = out.read_bytes()
     with log.open("a") as file:
         file.write("1.0,0.0,broken\n")

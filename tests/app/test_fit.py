@@ -135,15 +135,13 @@ def test_the_reports_script_replays_the_log(
 
 @pytest.mark.slow
 def test_the_command_line(hybridsep: Run, short: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
-    status, out, err = hybridsep("fit", short, "--out", tmp_path / "fit", "--Np", 40, "--json")
-    assert status == 0, err
+    out = hybridsep.done("fit", short, "--out", tmp_path / "fit", "--Np", 40, "--json")
     result = json.loads(out)
     assert result["findings"] == {"my axis.csv": []}
     assert set(result["files"].values()) == {str(path) for path in (tmp_path / "fit").iterdir()}
     assert load_machine(tmp_path / "fit" / "machine.toml").name == "my_axis"
     request.getfixturevalue("quick_fit")
-    status, out, err = hybridsep("fit", short, "--out", tmp_path / "fit", "--Np", 40)
-    assert status == 0, err
+    out = hybridsep.done("fit", short, "--out", tmp_path / "fit", "--Np", 40)
     assert "Np = 40" in out
     out = " ".join(out.split())
     assert "my axis.csv: 800 samples, 0.8 s at 1000 Hz, travel 20 mm, as the file states no unit" in out

@@ -51,15 +51,13 @@ def test_a_vibration_in_time_is_no_period() -> None:
 def test_a_period_is_hinted_at_and_taken(hybridsep: Run, tmp_path: Path) -> None:
     x_d = long_moves()
     log = write_rows(tmp_path / "axis.csv", x_d, screw(x_d, 8e-6))
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "without", "--Np", 50)
-    assert status == 0, err
+    out = hybridsep.done("fit", log, "--out", tmp_path / "without", "--Np", 50)
     words = " ".join(out.split())
     assert "the residual repeats every 10 mm: with --period 0.01 the hybrid's error would go from " in words
     found = json.loads((tmp_path / "without" / "fit.json").read_text())
     [period] = [one for one in found["identification"]["findings"] if one.startswith("the residual repeats")]
     assert period.split(" m")[0] in (tmp_path / "without" / "report.html").read_text(encoding="utf-8")
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "with", "--Np", 50, "--period", PITCH)
-    assert status == 0, err
+    out = hybridsep.done("fit", log, "--out", tmp_path / "with", "--Np", 50, "--period", PITCH)
     assert "the residual repeats" not in out
     training = json.loads((tmp_path / "with" / "fit.json").read_text())
     assert training["judged"]["rms_h"] < 0.5 * found["judged"]["rms_h"]
@@ -85,8 +83,7 @@ def test_a_late_encoder_is_no_dead_time(hybridsep: Run, tmp_path: Path) -> None:
     results = {}
     for n_late, log in logs.items():
         out = tmp_path / f"fit{n_late}"
-        status, said, err = hybridsep("fit", log, "--out", out, "--Np", 50, "--measurement_delay", n_late, "--json")
-        assert status == 0, err
+        said = hybridsep.done("fit", log, "--out", out, "--Np", 50, "--measurement_delay", n_late, "--json")
         results[n_late] = json.loads(said)
         machine = load_machine(out / "machine.toml")
         assert machine.predictor_settings.measurement_delay == n_late

@@ -37,8 +37,7 @@ def arx_rms(x_d: Array, x: Array, n: int) -> float:
 def test_the_hybrid_is_not_recommended_where_an_arx_is_better(hybridsep: Run, tmp_path: Path) -> None:
     log = RECORDINGS / "cnc_a_axis2.npz"
     used = read_log(log)
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", NP)
-    assert status == 0, err
+    out = hybridsep.done("fit", log, "--out", tmp_path / "fit", "--Np", NP)
     judged = json.loads((tmp_path / "fit" / "fit.json").read_text())["judged"]
     arx = arx_rms(used.x_d, used.x_meas, 20)
     assert judged["rms_h"] > 1.02 * arx
@@ -68,8 +67,7 @@ def test_the_physics_model_is_judged_with_its_offset(
     rng = np.random.default_rng(0)
     x_d = commanded()[:800]
     log = write_rows(tmp_path / "axis.csv", x_d, x_d + 40e-6 + 1e-6 * rng.normal(size=800))
-    status, _, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
-    assert status == 0, err
+    hybridsep.done("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     found = json.loads((tmp_path / "fit" / "fit.json").read_text())
     assert found["judged"]["rms_pb"] < 2e-6
     assert found["identification"]["offset"] == pytest.approx(40e-6, rel=0.05)
@@ -85,8 +83,7 @@ def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_pa
     rows = np.column_stack((np.arange(1600) * 1e-3, 3000 * commanded()[:1600], x))
     log = tmp_path / "axis.csv"
     np.savetxt(log, rows, delimiter=",", header="t,x_d [deg],x [deg]", comments="", fmt="%.12g")
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
-    assert status == 0, err
+    out = hybridsep.done("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     words = " ".join(out.split())
     head = "800 of 1600 samples (50 %), 1.6 s at 500 Hz (recorded at 1000 Hz)"
     assert f"axis.csv: {head}, travel 60 deg" in words

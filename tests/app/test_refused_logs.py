@@ -31,8 +31,7 @@ def test_a_log_without_any_measurement(
     """NaN in all samples: RuntimeWarnings, a state that had learned no sample, and three files."""
     folder = without_measurement.parent
     monkeypatch.chdir(folder)
-    status, out, err = hybridsep(command[0], "axis.csv", *command[1:])
-    assert (status, out) == (2, "")
+    err = hybridsep.refused(command[0], "axis.csv", *command[1:])
     assert err.count("\n") == 1
     assert "the measured position is missing (NaN) in all 2000 samples; name its column (--x), or record it" in err
     assert [path.name for path in folder.iterdir()] == ["axis.csv"]
@@ -56,13 +55,11 @@ def test_a_refusal_names_its_file_and_itself_once(
     x = np.convolve(x_d, np.exp(-np.arange(60) / 12) / 12)[:2000]  # a lag of 12 ms
     write_rows(tmp_path / "axis.csv", x_d, x, header="t,x [m],x_d")
     monkeypatch.setattr("sys.argv", ["hybridsep", "fit", "axis.csv"])
-    status, out, err = hybridsep("fit", "axis.csv", "--out", "fit")
-    assert (status, out) == (2, "")
+    err = hybridsep.refused("fit", "axis.csv", "--out", "fit")
     assert err.startswith("error: axis.csv: columns swapped: x_d follows x, ")
     assert err.count("error:") == 1
     assert "  hybridsep fit axis.csv --out fit --x_d 'x [m]' --x x_d  # the two columns exchanged" in err
-    status, out, err = hybridsep("backtest", "axis.csv", *MACHINE, "--report", "page.html")
-    assert (status, out) == (2, "")
+    err = hybridsep.refused("backtest", "axis.csv", *MACHINE, "--report", "page.html")
     assert err.startswith("error: axis.csv: columns swapped: x_d follows x, ")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["axis.csv"]
 
@@ -71,8 +68,7 @@ def test_a_refusal_names_its_file_and_itself_once(
 def test_a_log_without_units_is_refused_with_lines_to_paste(tmp_path: Path, hybridsep: Run, scale: float) -> None:
     log = write_log(tmp_path / "joint 3.csv", header="t,goal,present", scale=scale)
     given = ("fit", log, "--x_d", "goal", "--x", "present")
-    status, out, err = hybridsep(*given, "--out", tmp_path / "fit")
-    assert (status, out) == (2, "")
+    err = hybridsep.refused(*given, "--out", tmp_path / "fit")
     lines = [line.strip() for line in err.splitlines() if line.startswith("  hybridsep ")]
     command = shlex.split(lines[0], comments=True)
     assert command == ["hybridsep", *map(str, given), "--out", str(tmp_path / "fit"), "--unit", "mm"]
@@ -86,20 +82,19 @@ def test_a_machine_file_that_fit_wrote_is_named(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_log(Path("axis.csv"), n=20)
-    status, _, err = hybridsep("backtest", "axis.csv")
-    assert status == 2
+    err = hybridsep.refused("backtest", "axis.csv")
     assert "It is the axis's machine file, which hybridsep fit axis.csv writes" in " ".join(err.split())
     Path("axis").mkdir()
     Path("axis/machine.toml").touch()
-    status, _, err = hybridsep("backtest", "axis.csv")
-    assert status == 2
+    err = hybridsep.refused("backtest", "axis.csv")
     assert "There is axis/machine.toml: add -m axis/machine.toml" in " ".join(err.split())
 
 
 def test_the_same_log_twice_counts_once(tmp_path: Path, hybridsep: Run) -> None:
     logs = [write_rows(tmp_path / name, commanded()[:800], measured(0)[:800]) for name in ("a.csv", "b.csv")]
-    status, _, err = hybridsep("fit", *logs, "--Np", 500, "--out", tmp_path / "fit")
-    assert status == 2  # a refusal that comes behind, and soon
+    err = hybridsep.refused(
+        "fit", *logs, "--Np", 500, "--out", tmp_path / "fit"
+    )  # a refusal that comes behind, and soon
     assert f"note: {logs[1]} has the samples of {logs[0]}: it counts once" in err
 
 
@@ -123,8 +118,7 @@ def test_channels_are_listed(tmp_path: Path, hybridsep: Run) -> None:
     assert listed["x"] == {"name": "x", "unit": "m", "role": "x"}
     assert [one.name for one in tmp_path.iterdir()] == ["log.csv"]
     odd = write_log(tmp_path / "odd.csv", n=20, header="t,goal,present")
-    status, out, _ = hybridsep("fit", odd, "--list-channels")
-    assert status == 0
+    out = hybridsep.done("fit", odd, "--list-channels")
     words = "none is read as the commanded and measured position; name it: hybridsep fit "
     assert f"{words}{odd} --x_d NAME --x NAME" in out
 
@@ -132,11 +126,9 @@ def test_channels_are_listed(tmp_path: Path, hybridsep: Run) -> None:
 def test_rates_that_differ_are_said_and_resampled(tmp_path: Path, hybridsep: Run) -> None:
     path = recording(tmp_path / "log.csv")
     replay = ("backtest", path, "-m", "spring_mass_damper", "--json")
-    status, _, err = hybridsep(*replay)
-    assert status == 2
+    err = hybridsep.refused(*replay)
     assert "'x_d' has 4000 samples every 0.001 s, 'x' has 2000 samples every 0.002 s" in err
     assert "(--resample) takes both at the times of the slower one" in err
-    status, _, err = hybridsep(*replay, "--resample")
-    assert status == 2  # the machine has 1 kHz
+    err = hybridsep.refused(*replay, "--resample")  # the machine has 1 kHz
     assert "sampled every 0.002 s, but machine spring_mass_damper has T_s = 0.001 s" in err
     assert len(read_log(path, resample=True).t) == 2000

@@ -18,6 +18,7 @@ from c_core import CModel
 from c_library import Library, configured, installed
 from library_stream import trained_state
 from places import ROOT
+from programs import output_of
 from spoiled_weights import spoiled
 from stream import STAGE_COMPENSATOR, machine_of
 
@@ -39,16 +40,12 @@ def library(kind: str = "predictor", /, **settings: float) -> Library:
     return Library(kind, settings, [MODE])
 
 
-def program(path: Path, *arguments: object) -> str:
-    return subprocess.run([path, *map(str, arguments)], capture_output=True, text=True, check=True).stdout
-
-
 @pytest.mark.slow
 def test_other_projects_find_the_package(tmp_path: Path) -> None:
     configured(
         CONSUMER, tmp_path, f"CMAKE_PREFIX_PATH={installed()}", "CMAKE_CXX_FLAGS=-Wall -Wextra -pedantic -Werror"
     )
-    assert [program(tmp_path / name) for name in ("in_c", "in_cpp")] == ["9 1\n", "9 1\n"]
+    assert [output_of(tmp_path / name) for name in ("in_c", "in_cpp")] == ["9 1\n", "9 1\n"]
     cache = (tmp_path / "CMakeCache.txt").read_text(encoding="utf-8")
     assert f"hsep_DIR:PATH={installed()}/" in cache  # and no other one
 
@@ -59,8 +56,8 @@ def test_pkg_config_tells_where_it_is(tmp_path: Path) -> None:
     fields = dict(re.findall(r"^(Cflags|Libs): (.*)$", file.read_text(encoding="utf-8"), re.MULTILINE))
     prefix = str(file.parent / ".." / "..")
     cflags, libs = (fields[name].replace("${prefix}", prefix).split() for name in ("Cflags", "Libs"))
-    subprocess.run([*compiler(), *cflags, CONSUMER / "main.c", *libs, "-o", tmp_path / "main"], check=True)
-    assert program(tmp_path / "main") == "9 1\n"
+    output_of(*compiler(), *cflags, CONSUMER / "main.c", *libs, "-o", tmp_path / "main")
+    assert output_of(tmp_path / "main") == "9 1\n"
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -232,6 +229,4 @@ def test_compilers_take_it_without_a_warning(name: str, standard: str, tmp_path:
     flags = [f"-std={standard}", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off", "-c"]
     sources = sorted(C_SOURCES.glob("core/**/*.c"))
     included = ["-include", str(tmp_path / "short_names.h"), *include_flags()]
-    arguments = [*command, *flags, *included, *map(str, sources)]
-    done = subprocess.run(arguments, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    output_of(*command, *flags, *included, *sources, cwd=tmp_path)

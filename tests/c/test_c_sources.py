@@ -1,7 +1,6 @@
 """The C sources themselves: what they need, and that they compile."""
 
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import elf
 import pytest
 from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
 from places import ROOT
+from programs import output_of
 from stream import COMPENSATOR, TRAJECTORY
 
 from hybridsep.fmi.c_header import all_c
@@ -28,8 +28,7 @@ def test_the_c_files_are_formatted() -> None:
         if path.suffix in SUFFIXES
     ]
     assert len(files) > 60
-    done = subprocess.run([command, "--dry-run", "--Werror", *files], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    output_of(command, "--dry-run", "--Werror", *files)
     assert [path for path in files if max(map(len, path.read_text(encoding="utf-8").splitlines())) > 120] == []
 
 

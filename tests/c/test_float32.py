@@ -1,7 +1,6 @@
 """The C library in single precision, ``HSEP_FLOAT32``, and without vectors, beside itself in double precision."""
 
 import re
-import subprocess
 from functools import cache
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import pytest
 from c_compiler import C_SOURCES, build_folder, include_flags, run_compiler
 from c_core import object_files
 from controllers import target_or_skip
+from programs import output_of
 
 from benchmarks.targets.cases import KINDS, OUTPUTS, Case, header, recorded
 from benchmarks.targets.targets import FLOAT32, HERE, TARGETS, Replay, build, core_sources, replay
@@ -117,9 +117,8 @@ def test_no_operation_of_a_sample_is_a_call(tmp_path: Path) -> None:
     for source in core_sources():
         object_file = tmp_path / f"{source.stem}.o"
         flags = ["-O2", "-std=c99", "-ffp-contract=off", *include_flags()]
-        subprocess.run([*machine.compiler, *flags, "-c", str(source), "-o", str(object_file)], check=True)
-        names = subprocess.run([machine.nm, object_file], capture_output=True, text=True, check=True).stdout
-        if re.search(r"__aeabi_d\w+", names):
+        output_of(*machine.compiler, *flags, "-c", source, "-o", object_file)
+        if re.search(r"__aeabi_d\w+", output_of(machine.nm, object_file)):
             calls.add(source.stem)
     assert calls == {"hsep_learned"}
 

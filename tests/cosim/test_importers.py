@@ -2,7 +2,6 @@
 
 import os
 import re
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
@@ -13,6 +12,7 @@ import pytest
 from built_once import BuiltFmus
 from importers import IMPORTERS, OWN, exists_here, observed
 from places import ROOT, SUPPORT
+from programs import output_of
 
 from hybridsep import cosimulate, load_machine, staircase
 from hybridsep.cosim.run import Run
@@ -46,11 +46,8 @@ def written(folder: Path, system: str, place: str = "") -> Path:
 
 def python(folder: Path, *arguments: object) -> str:
     """Return what Python prints with these arguments, run in a folder; the tests' modules can be imported."""
-    command = [sys.executable, "-W", "error", *map(str, arguments)]
     environment = os.environ | {"PYTHONPATH": str(SUPPORT)}
-    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment, timeout=600)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return output_of(sys.executable, "-W", "error", *arguments, cwd=folder, env=environment, timeout=600)
 
 
 @pytest.mark.slow

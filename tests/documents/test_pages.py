@@ -2,7 +2,6 @@
 
 import json
 import re
-import subprocess
 import sys
 from datetime import date
 from functools import cache
@@ -12,6 +11,7 @@ from xml.etree import ElementTree as ET
 import pytest
 from built_once import BuiltFmus
 from places import ROOT
+from programs import output_of
 
 from benchmarks.pictures import FOLDER as PICTURES
 from benchmarks.pictures import MAKERS, RECORD, digest
@@ -163,10 +163,7 @@ EXAMPLES = [path.name for path in sorted((ROOT / "examples").glob("*.py")) if "_
 @pytest.mark.nightly  # by day: test_commands, test_paper, test_machine, test_help
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_examples_run(example: str, tmp_path: Path) -> None:
-    command = [sys.executable, "-W", "error", str(ROOT / "examples" / example)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout
+    assert output_of(sys.executable, "-W", "error", ROOT / "examples" / example, cwd=tmp_path)
 
 
 RECORDED = json.loads(RECORD.read_text(encoding="utf-8"))

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from places import CASES, ROOT, SUPPORT
+from programs import output_of
 
 from hybridsep.base.errors import LogError
 from hybridsep.base.signals import Array
@@ -95,8 +95,7 @@ def test_the_page_reads_what_the_library_reads_or_refuses(tmp_path: Path) -> Non
         file.write_text(text, encoding="utf-8")
     for folder in (CASES, CASES.parent / "turn6" / "logs"):
         files += sorted(path for path in folder.glob("*.csv*") if "frf" not in path.name)
-    script = [node, str(SUPPORT / "run_try.js"), str(ROOT / "docs" / "try" / "try.js"), *map(str, files)]
-    lines = subprocess.run(script, check=True, capture_output=True, text=True).stdout.splitlines()
+    lines = output_of(node, SUPPORT / "run_try.js", ROOT / "docs" / "try" / "try.js", *files).splitlines()
     for file, line in zip(files, lines, strict=True):
         page, library = json.loads(line), of_the_library(file)
         if "refused" in page:

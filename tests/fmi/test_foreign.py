@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from c_compiler import FLAGS, FMI_HEADERS
 from places import ROOT
+from programs import output_of
 
 from hybridsep import build_fmu, load_machine
 from hybridsep.base.signals import Array
@@ -106,9 +107,8 @@ def play(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str, st
             str(len(references["input"])),
         ]
         command += [*references["input"], *references["output"], f"{absolute}{signals}"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=900, env=wine)
-        assert done.returncode == 0, done.stderr
-        return np.array([[float.fromhex(number) for number in line.split()] for line in done.stdout.splitlines()])
+        printed = output_of(*command, timeout=900, env=wine)
+        return np.array([[float.fromhex(number) for number in line.split()] for line in printed.splitlines()])
 
     yield played
     if (out / "wine").exists():

@@ -3,7 +3,6 @@
 import os
 import re
 import shlex
-import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import pytest
 from command_line import Run
 from places import ROOT
+from programs import output_of
 
 from hybridsep import load_machine
 from hybridsep.base.errors import FmuError
@@ -58,11 +58,9 @@ def fill(folder: Path, wanted: list[tuple[str, str]]) -> None:
 def test_without_compiler_and_libraries_build_says_what_to_do(without: Path, hybridsep: Run) -> None:
     assert "pip install ziglang" in no_native()
     assert default_targets() == ("host",)
-    status, _, error = hybridsep("build", "FeedDrive", "--target", "host", "--out", without)
-    assert status == 2
+    error = hybridsep.refused("build", "FeedDrive", "--target", "host", "--out", without)
     assert "no C compiler: no ziglang and none of $CC, cc, gcc, clang; pip install ziglang" in " ".join(error.split())
-    status, _, error = hybridsep("build", "FeedDrive", "--target", "win64", "--out", without)
-    assert status == 2
+    error = hybridsep.refused("build", "FeedDrive", "--target", "win64", "--out", without)
     pinned = ZIG.replace(" ", "==")
     needs = f"compiling for x86_64-windows needs ziglang: pip install {pinned}, or ask for the target host"
     assert needs in " ".join(error.split())
@@ -107,7 +105,7 @@ def test_the_line_for_all_platforms_builds_the_same_fmu(hybridsep: Run, tmp_path
     assert (says, program) == (f"native FMUs are for {host_target()}; for all platforms", "hybridsep")
     first = fmu.read_bytes()
     fmu.unlink()
-    assert hybridsep(*("host" if word == "all" else word for word in arguments))[0] == 0
+    hybridsep.done(*("host" if word == "all" else word for word in arguments))
     assert fmu.read_bytes() == first
 
 
@@ -195,6 +193,4 @@ def test_the_look_ahead_fmus_compile_for_every_platform(tmp_path: Path, target: 
         for file, content in module._sources(kind).items():
             (tmp_path / file).write_bytes(content)
         flags = ["-std=c99", "-O0", "-Wall", "-Wextra", "-Werror", "-D_GNU_SOURCE", "-I."]
-        command = [*compiler_for(target).command, *flags, "-c", "all.c", "-o", "all.o"]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-        assert done.returncode == 0, f"{kind}: {done.stderr}"
+        output_of(*compiler_for(target).command, *flags, "-c", "all.c", "-o", "all.o", cwd=tmp_path)

@@ -2,7 +2,6 @@
 
 import json
 import re
-import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
@@ -14,6 +13,7 @@ from built_once import BuiltFmus
 from driving import T_S, closed_loop, replay, steps
 from library_stream import trained_state
 from places import ROOT
+from programs import output_of
 from streams import FmuStream
 
 from hybridsep import FmuInstance, build_fmu, load_machine, paper_machine
@@ -135,7 +135,7 @@ assert any(name.endswith("Py") for name in dir(slave))
         assert {"slave.py", "predict/predictor.py", "plants/feed_drive.py"} < found
         assert not {"machines/machine.py", "compensate/qp.py", "fmi/archive.py"} & found
         assert "Limits of pythonfmu 0.7" in page
-        subprocess.run([sys.executable, "-c", script], check=True, cwd=tmp_path / name / "resources")
+        output_of(sys.executable, "-c", script, cwd=tmp_path / name / "resources")
 
 
 @pytest.mark.slow
@@ -150,9 +150,8 @@ for _ in range(3):
     except HybridSepError as error:
         print(error)
 """
-    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.count("the FMU needs a Python with NumPy and SciPy") == 3
+    printed = output_of(sys.executable, "-c", script, cwd=ROOT)
+    assert printed.count("the FMU needs a Python with NumPy and SciPy") == 3
 
 
 def test_our_importer_leaves_no_removed_folder_in_the_path(fmus: BuiltFmus) -> None:

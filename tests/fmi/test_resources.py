@@ -65,7 +65,8 @@ def test_resources_are_found_where_they_are_said_or_beside_the_library(
 
 def test_uris_of_windows(tmp_path: Path) -> None:
     library = tmp_path / "uri.so"
-    run_compiler(["-shared", "-fPIC", "-O1", *include_flags(), "-o", library, C_SOURCES / "fmi" / "hsep_uri.c"])
+    sources = [C_SOURCES / "model" / f"hsep_{one}.c" for one in ("resource", "text")]
+    run_compiler(["-shared", "-fPIC", "-O1", *include_flags(), "-o", library, *sources])
     convert = ctypes.CDLL(str(library)).hsep_uri_folder
     for uri, windows, expected in (
         ("file:///C:/a%20b/resources", 1, "C:/a b/resources/"),

@@ -31,10 +31,9 @@ def unpacked(fmu: Path, folder: Path) -> Path:
 
 
 def built(hybridsep: Run, out: Path, *arguments: object) -> list[Path]:
-    status, text, error = hybridsep(
+    text = hybridsep.done(
         "build", *arguments, "-m", "spring_mass_damper", "--target", "host", "--for", "twincat", "--out", out
     )
-    assert status == 0, error
     return [Path(line.rpartition("  ")[0]) for line in text.splitlines()]
 
 

@@ -42,27 +42,18 @@ static int named(const char *format, va_list values)
     return length > HAL_NAME_LEN ? -1 : 0;
 }
 
-#define STUB_PIN(kind) \
-    static int hal_pin_##kind##_newf(int way, hal_##kind##_t **pin, int id, const char *format, ...) \
+#define STUB_NEW(function, type, value, action) \
+    static int function(int way, type value, int id, const char *format, ...) \
     { \
         va_list values; \
         va_start(values, format); \
         const int refused = named(format, values); \
         va_end(values); \
-        *pin = calloc(1, sizeof **pin); \
-        (void)way, (void)id; \
+        (void)way, (void)id, action; \
         return refused; \
     }
-#define STUB_PARAMETER(kind) \
-    static int hal_param_##kind##_newf(int way, hal_##kind##_t *value, int id, const char *format, ...) \
-    { \
-        va_list values; \
-        va_start(values, format); \
-        const int refused = named(format, values); \
-        va_end(values); \
-        (void)way, (void)id, (void)value; \
-        return refused; \
-    }
+#define STUB_PIN(kind) STUB_NEW(hal_pin_##kind##_newf, hal_##kind##_t, **pin, *pin = calloc(1, sizeof **pin))
+#define STUB_PARAMETER(kind) STUB_NEW(hal_param_##kind##_newf, hal_##kind##_t, *value, (void)value)
 STUB_PIN(float)
 STUB_PIN(bit)
 STUB_PIN(s32)

@@ -42,7 +42,7 @@ def axis(folder: Path, *changes: tuple[str, str]) -> Path:
 
 def test_a_component_and_a_folder_for_each_axis_are_written(hybridsep: Run, tmp_path: Path) -> None:
     status, out, err = hybridsep("hal", *AXES, "--out", tmp_path)
-    assert status == 0
+    assert status == 0, err
     assert "halcompile --install" in out
     assert f"loadrt hsep axes={tmp_path}/x,{tmp_path}/y" in out.replace("\n", "")
     assert "estimates" not in err
@@ -55,7 +55,7 @@ def test_a_component_and_a_folder_for_each_axis_are_written(hybridsep: Run, tmp_
     )
     status, _, err = hybridsep("hal", longest, "--out", tmp_path, "--force")
     assert (status, f"warning: [drive_limits] of {'n' * 31}: estimates" in err) == (0, True)
-    assert hybridsep("hal", "emps", "--predictor", "--out", tmp_path)[0] == 0
+    hybridsep.done("hal", "emps", "--predictor", "--out", tmp_path)
     assert (tmp_path / "hsep_predictor.c").is_file()
 
 
@@ -67,7 +67,7 @@ def test_an_axis_starts_with_what_was_learned(hybridsep: Run, tmp_path: Path) ->
     predictor.update(0.99 * command)
     predictor.save(tmp_path / "x.state")
     given = ("--out", tmp_path, "--weights", tmp_path / "x.state")
-    assert hybridsep("hal", AXES[0], *given)[0] == 0
+    hybridsep.done("hal", AXES[0], *given)
     assert (tmp_path / "x" / "weights.bin").read_bytes().startswith(b"HSEPWG")
     status, out, _ = hybridsep("hal", AXES[0], "--out", tmp_path, "--force")
     assert (status, "weights.bin removed: without --weights the axis starts cold" in out) == (0, True)
@@ -210,5 +210,4 @@ def test_a_sampled_log_is_read_as_it_is(hybridsep: Run, tmp_path: Path) -> None:
     table[:, sampled_columns.COLUMNS.index("x_fb")] = 10.0 * np.sin(2e-3 * (np.arange(n) - 5))
     np.savetxt(tmp_path / "samples.txt", table, header=" ".join(sampled_columns.COLUMNS), comments="", fmt="%.6f")
     reading = ("--x_d", "x_out", "--x", "x_fb", "--unit", "mm", "--T_s", "0.001")
-    status, _, err = hybridsep("backtest", str(tmp_path / "samples.txt"), "--machine", AXES[0], *reading)
-    assert status == 0, err
+    hybridsep.done("backtest", str(tmp_path / "samples.txt"), "--machine", AXES[0], *reading)

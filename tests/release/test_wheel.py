@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from built_once import built_once
 from places import ROOT
+from programs import output_of
 
 from hybridsep import build_fmu, load_machine
 from hybridsep.base.version import version_text
@@ -23,19 +24,11 @@ WINDOWS = sys.platform == "win32"
 SCRIPTS = "Scripts" if WINDOWS else "bin"
 
 
-def run(*command: object, cwd: Path, env: dict[str, str] | None = None) -> str:
-    done = subprocess.run(
-        list(map(str, command)), cwd=cwd, env=env, capture_output=True, text=True, encoding="utf-8", check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
-
-
 def built(kind: str, source: Path, out: Path) -> Path:
     """Build a wheel or an sdist offline, with the libraries that this checkout has kept."""
     kept = {"HYBRIDSEP_LIBRARIES": str(compiling._cache()), "HYBRIDSEP_TARGETS": ",".join(ready_targets())}
     env = {**os.environ, **kept}
-    run(sys.executable, "-m", "hatchling", "build", "--target", kind, "--directory", out, cwd=source, env=env)
+    output_of(sys.executable, "-m", "hatchling", "build", "--target", kind, "--directory", out, cwd=source, env=env)
     (archive,) = out.iterdir()
     return archive
 
@@ -69,8 +62,10 @@ def scripts(archives: Path, session_folder: Path) -> Path:
         python = folder / SCRIPTS / "python"
         (wheel,) = (archives / "wheel").iterdir()
         pip = [sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", "--no-index"]
-        run(*pip, wheel, cwd=folder)
-        place = Path(run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=folder).strip())
+        output_of(*pip, wheel, cwd=folder)
+        place = Path(
+            output_of(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=folder).strip()
+        )
         shared = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
         without_zig = 'import sys; sys.modules["ziglang"] = None'
         (place / "shared.pth").write_text("\n".join([*shared, without_zig, ""]), encoding="utf-8")
@@ -108,10 +103,10 @@ def test_the_wheel_follows_from_the_sdist(archives: Path, tmp_path: Path) -> Non
 @pytest.mark.slow
 def test_the_wheel_runs_without_a_compiler(scripts: Path, environment: dict[str, str], tmp_path: Path) -> None:
     def hybridsep(*arguments: object) -> str:
-        return run(scripts / "hybridsep", *arguments, cwd=tmp_path, env=environment)
+        return output_of(scripts / "hybridsep", *arguments, cwd=tmp_path, env=environment)
 
     python = scripts / "python"
-    where = run(python, "-c", "import hybridsep; print(hybridsep.__file__)", cwd=tmp_path, env=environment)
+    where = output_of(python, "-c", "import hybridsep; print(hybridsep.__file__)", cwd=tmp_path, env=environment)
     assert Path(where.strip()).is_relative_to(scripts.parent)
     with_compiler = "from hybridsep.fmi.compile import compiler_for, host_target; compiler_for(host_target())"
     done = subprocess.run([python, "-c", with_compiler], cwd=tmp_path, env=environment, capture_output=True, text=True)

@@ -192,7 +192,7 @@ class CModel:
         return self.state.ctypes.data_as(ctypes.c_void_p)
 
     def _call(self, function: str, *arguments: Any) -> None:
-        message = ctypes.create_string_buffer(b"\xff" * MESSAGE_SIZE + b"unwritten")
+        message = ctypes.create_string_buffer(b"\0" * MESSAGE_SIZE + b"unwritten")
         status = getattr(self.library, f"hsep_model_{function}")(ctypes.byref(self.context), *arguments, message)
         assert message.raw[MESSAGE_SIZE:] == b"unwritten\0"
         if status == 1:

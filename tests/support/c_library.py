@@ -2,7 +2,6 @@
 
 import ctypes
 import os
-import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -12,6 +11,7 @@ from typing import Any
 from built_once import built_once, shared_builds
 from c_compiler import C_SOURCES
 from c_core import library as core_library
+from programs import output_of
 from stream import STAGE_COMPENSATOR
 
 from hybridsep.base.parameters import Parameter
@@ -23,15 +23,7 @@ STRICT = "-Wall -Wextra -Wconversion -pedantic -Werror"
 def cmake(*arguments: str | Path) -> str:
     """Run the package's cmake, a dependency of the tests, on Ninja; return what it printed."""
     environment = os.environ | {"PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])}
-    done = subprocess.run(
-        [sys.executable, "-m", "cmake", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=environment,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    return output_of(sys.executable, "-m", "cmake", *arguments, env=environment)
 
 
 def configured(source: Path, folder: Path, *definitions: str) -> None:
@@ -54,70 +46,42 @@ def installed() -> Path:
     return built_once(shared_builds() / "hsep_package", build)
 
 
-def _fields(settings: dict[str, Parameter]) -> tuple[tuple[str, Any], ...]:
-    return tuple(
-        (name, ctypes.c_double if parameter.kind is float else ctypes.c_uint64) for name, parameter in settings.items()
-    )
-
-
 class Mode(ctypes.Structure):
     """hsep_mode."""
 
     _fields_ = tuple((name, ctypes.c_double) for name in ("f_n", "zeta", "alpha", "beta"))
 
 
-class PredictorPart(ctypes.Structure):
-    """hsep_predictor_settings."""
-
-    _fields_ = _fields(dict(PREDICTOR_SETTINGS))
-
-
-class AveragingPart(ctypes.Structure):
-    """hsep_averaging_settings."""
-
-    _fields_ = _fields(dict(AVERAGING_SETTINGS))
+def _part(settings: Mapping[str, Parameter]) -> type[ctypes.Structure]:
+    """Return the struct of a part's settings, as hsep_predictor_settings is one."""
+    kinds = {name: ctypes.c_double if one.kind is float else ctypes.c_uint64 for name, one in settings.items()}
+    return type("Part", (ctypes.Structure,), {"_fields_": tuple(kinds.items())})
 
 
-class CompensatorPart(ctypes.Structure):
-    """hsep_compensator_settings."""
-
-    _fields_ = _fields(dict(COMPENSATOR_SETTINGS))
+_SETTINGS = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
+PARTS = {name: _part(settings) for name, settings in _SETTINGS.items()}
+"""Structs of settings, by their names in hsep_parameters."""
 
 
 class Parameters(ctypes.Structure):
     """hsep_parameters."""
 
-    _fields_ = (
-        ("predictor", PredictorPart),
-        ("averaging", AveragingPart),
-        ("compensator", CompensatorPart),
-        ("n_modes", ctypes.c_uint64),
-        ("modes", ctypes.POINTER(Mode)),
-    )
+    _fields_ = (*PARTS.items(), ("n_modes", ctypes.c_uint64), ("modes", ctypes.POINTER(Mode)))
 
     def __setitem__(self, name: str, value: float) -> None:
         """Set a setting, whichever part has it."""
-        parts = (
-            ("predictor", PREDICTOR_SETTINGS),
-            ("averaging", AVERAGING_SETTINGS),
-            ("compensator", COMPENSATOR_SETTINGS),
-        )
-        part = next(part for part, settings in parts if name in settings)
+        part = next(part for part, settings in _SETTINGS.items() if name in settings)
         setattr(getattr(self, part), name, value)
 
 
 class PredictorOutputs(ctypes.Structure):
     """hsep_predictor_outputs."""
 
+    _reals = ("x_d", "x_pb", "x_h", "x_h_std", "rms_e", "rms_pb", "rms_h", "rms_hold")
     _fields_ = (
-        *(
-            (name, ctypes.c_double)
-            for name in ("x_d", "x_pb", "x_h", "x_h_std", "rms_e", "rms_pb", "rms_h", "rms_hold")
-        ),
-        ("batch", ctypes.c_uint64),
-        ("n_rejected", ctypes.c_uint64),
-        ("hybrid_active", ctypes.c_int),
-        ("divergence", ctypes.c_int),
+        *((name, ctypes.c_double) for name in _reals),
+        *((name, ctypes.c_uint64) for name in ("batch", "n_rejected")),
+        *((name, ctypes.c_int) for name in ("hybrid_active", "divergence")),
     )
 
 

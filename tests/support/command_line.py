@@ -3,12 +3,12 @@
 import math
 import re
 import shlex
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import output_of
 from staircase_data import commanded, measured
 
 from hybridsep.app import cli, console
@@ -32,6 +32,18 @@ class Run:
         out, err = self.capsys.readouterr()
         return status, out, err
 
+    def done(self, *arguments: object) -> str:
+        """Run a command that must succeed; return its standard output."""
+        status, out, err = self(*arguments)
+        assert status == 0, f"{arguments}: {err}"
+        return out
+
+    def refused(self, *arguments: object) -> str:
+        """Run a command that must be refused and print nothing; return what it says."""
+        status, out, err = self(*arguments)
+        assert (status, out) == (2, ""), err
+        return err
+
 
 def predictor(**values: object) -> list[str]:
     """Return the options that set entries of ``[predictor]``; a name ends in ``_`` where it is a word of Python's."""
@@ -42,12 +54,10 @@ def run_line(text: str, hybridsep: Run) -> None:
     """Run a line as a shell would."""
     program, *arguments = shlex.split(text)
     if program == "hybridsep":
-        status, _, err = hybridsep(*arguments)
-        assert status == 0, f"{text}: {err}"
+        hybridsep.done(*arguments)
     else:
         assert program == "python", text
-        done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True)
-        assert done.returncode == 0, f"{text}: {done.stderr}"
+        output_of(sys.executable, *arguments)
 
 
 def run_page(page: Path, hybridsep: Run) -> None:

@@ -112,18 +112,14 @@ class Library:
 
         Without callbacks those that log and count, none for False; ``odd`` are the arguments that only one version has.
         """
-        place = None if resources is None else resources.encode()
-        given = byref(self.callbacks) if callbacks is None else callbacks and byref(callbacks)
-        instance: int | None = self.Instantiate(
-            name,
-            odd.get("kind", 1),
-            (self.guid if guid is None else guid).encode(),
-            place,
-            given or None,
-            False,
-            logging_on,
-        )
+        token, place = (self.guid if guid is None else guid).encode(), None if resources is None else resources.encode()
+        instance: int | None = self._instantiated(name, token, place, logging_on, callbacks, odd)
         return instance
+
+    def _instantiated(self, name: Any, token: Any, place: Any, logging_on: bool, callbacks: Any, odd: Any) -> Any:
+        given = byref(self.callbacks) if callbacks is None else callbacks and byref(callbacks)
+        kind = odd.get("kind", 1)
+        return self.Instantiate(name, kind, token, place, given or None, False, logging_on)
 
     def instance_in(self, state: str) -> int:
         """Return a new instance, brought into one of :data:`STATES` by legal calls."""
@@ -236,23 +232,12 @@ class Library3(Library):
         counted = getattr(self._dll, "counted_blocks", None)
         return dict.fromkeys(range(counted()), 0) if counted else {}
 
-    def instantiate(
-        self,
-        name: bytes | None = b"one",
-        *,
-        guid: str | None = None,
-        resources: str | None = None,
-        logging_on: bool = False,
-        callbacks: Any = None,
-        **odd: Any,
-    ) -> int | None:
-        token, place = (self.guid if guid is None else guid).encode(), None if resources is None else resources.encode()
+    def _instantiated(self, name: Any, token: Any, place: Any, logging_on: bool, callbacks: Any, odd: Any) -> Any:
         logger = self.callbacks if callbacks is None else callbacks or fmi3.fmi3LogMessageCallback()
         none = fmi3.fmi3IntermediateUpdateCallback()
         event_mode, intermediate = odd.get("event_mode", False), odd.get("intermediate", 0)
         given = (False, logging_on, event_mode, True, None, intermediate, None, logger, none)
-        instance: int | None = self.InstantiateCoSimulation(name, token, place, *given)
-        return instance
+        return self.InstantiateCoSimulation(name, token, place, *given)
 
     def begin(self, instance: int | None, start: float = 0.0, stop: float | None = None) -> int:
         return int(self.EnterInitializationMode(instance, False, 0.0, start, stop is not None, stop or 0.0))

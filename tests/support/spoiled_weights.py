@@ -54,8 +54,6 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
         "another number of modes": with_head(1, n_modes + 1),
         "a setting that nothing depends on": with_setting(0, b"Np", 1.0),
         "a mode that is not there": with_setting(first_mode, b"mode[99].f_n", 1.0),
-        "a mode without a number": with_setting(first_mode, b"mode[].f_n", 1.0),
-        "a mode that is not closed": with_setting(first_mode, b"mode[1)f_n", 1.0),
         "no number of a mode": with_setting(first_mode, b"mode[1].mass", 1.0),
     }
     return damaged, other

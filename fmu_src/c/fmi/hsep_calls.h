@@ -25,8 +25,8 @@ typedef struct {
     unsigned legal;
 } hsep_call;
 
-/* HSEP_CALL_ROW defines a row as fmi2Reset_call; HSEP_CALL(fmi2, Reset) is its address. */
-#define HSEP_CALL_ROW(function, legal) static const hsep_call function##_call = {#function, legal};
+/* HSEP_LEGAL defines a row as fmi2Reset_call; HSEP_CALL(fmi2, Reset) is its address. */
+#define HSEP_LEGAL(function, legal) static const hsep_call function##_call = {#function, legal}
 #define HSEP_CALL(v, function) (&v##function##_call)
 
 /* The phases, short, for the columns of a table of calls. */

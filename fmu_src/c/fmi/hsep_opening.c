@@ -4,7 +4,6 @@
 #include "hsep_check.h"
 #include "hsep_crc.h"
 #include "hsep_resource.h"
-#include "hsep_uri.h"
 
 #include <math.h>
 #include <string.h>

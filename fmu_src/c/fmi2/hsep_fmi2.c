@@ -6,40 +6,38 @@
 
 #include <math.h>
 
-/* The calls that belong to an instance: CALL(function, states in which it is legal); the standard's table of the
+/* The calls that belong to an instance: HSEP_LEGAL(function, states in which it is legal); the standard's table of the
  * co-simulation state machine.
  * I: instantiated, M: Initialization Mode, S: stepping, T: terminated */
 /* clang-format off */
-#define HSEP_FMI2_ACCESS(CALL, type) \
-    CALL(fmi2Get##type,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2Set##type,                HSEP_I | HSEP_M | HSEP_S)
-#define HSEP_FMI2_CALLS(CALL) \
-    CALL(fmi2SetDebugLogging,          HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2SetupExperiment,          HSEP_I) \
-    CALL(fmi2EnterInitializationMode,  HSEP_I) \
-    CALL(fmi2ExitInitializationMode,            HSEP_M) \
-    CALL(fmi2Terminate,                                  HSEP_S) \
-    CALL(fmi2Reset,                    HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    HSEP_FMI2_ACCESS(CALL, Real) HSEP_FMI2_ACCESS(CALL, Integer) \
-    HSEP_FMI2_ACCESS(CALL, Boolean) HSEP_FMI2_ACCESS(CALL, String) \
-    CALL(fmi2GetFMUstate,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2SetFMUstate,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2FreeFMUstate,             HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2SerializedFMUstateSize,   HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2SerializeFMUstate,        HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2DeSerializeFMUstate,      HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2GetDirectionalDerivative,          HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi2SetRealInputDerivatives,  HSEP_I | HSEP_M | HSEP_S) \
-    CALL(fmi2GetRealOutputDerivatives,                   HSEP_S | HSEP_T) \
-    CALL(fmi2DoStep,                                     HSEP_S) \
-    CALL(fmi2CancelStep,               0) \
-    CALL(fmi2GetStatus,                                  HSEP_S | HSEP_T) \
-    CALL(fmi2GetRealStatus,                              HSEP_S | HSEP_T) \
-    CALL(fmi2GetIntegerStatus,                           HSEP_S | HSEP_T) \
-    CALL(fmi2GetBooleanStatus,                           HSEP_S | HSEP_T) \
-    CALL(fmi2GetStringStatus,                            HSEP_S | HSEP_T)
+#define HSEP_FMI2_ACCESS(type) \
+    HSEP_LEGAL(fmi2Get##type,                HSEP_I | HSEP_M | HSEP_S | HSEP_T); \
+    HSEP_LEGAL(fmi2Set##type,                HSEP_I | HSEP_M | HSEP_S)
+HSEP_LEGAL(fmi2SetDebugLogging,          HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2SetupExperiment,          HSEP_I);
+HSEP_LEGAL(fmi2EnterInitializationMode,  HSEP_I);
+HSEP_LEGAL(fmi2ExitInitializationMode,            HSEP_M);
+HSEP_LEGAL(fmi2Terminate,                                  HSEP_S);
+HSEP_LEGAL(fmi2Reset,                    HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_FMI2_ACCESS(Real); HSEP_FMI2_ACCESS(Integer);
+HSEP_FMI2_ACCESS(Boolean); HSEP_FMI2_ACCESS(String);
+HSEP_LEGAL(fmi2GetFMUstate,              HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2SetFMUstate,              HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2FreeFMUstate,             HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2SerializedFMUstateSize,   HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2SerializeFMUstate,        HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2DeSerializeFMUstate,      HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2GetDirectionalDerivative,          HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2SetRealInputDerivatives,  HSEP_I | HSEP_M | HSEP_S);
+HSEP_LEGAL(fmi2GetRealOutputDerivatives,                   HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2DoStep,                                     HSEP_S);
+HSEP_LEGAL(fmi2CancelStep,               0);
+HSEP_LEGAL(fmi2GetStatus,                                  HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2GetRealStatus,                              HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2GetIntegerStatus,                           HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2GetBooleanStatus,                           HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi2GetStringStatus,                            HSEP_S | HSEP_T);
 /* clang-format on */
-HSEP_FMI2_CALLS(HSEP_CALL_ROW)
 
 static size_t fmi2_n_variables(const hsep_context *context) { return context->n_variables; }
 

@@ -7,36 +7,34 @@
 
 #include "fmi3Functions.h"
 
-/* The calls that belong to an instance: CALL(function, states in which it is legal); the standard's table of the
+/* The calls that belong to an instance: HSEP_LEGAL(function, states in which it is legal); the standard's table of the
  * co-simulation state machine, without Event Mode, as modelDescription.xml says (hsep_fmi3_absent.c).
  * I: instantiated, C: Configuration Mode, M: Initialization Mode, S: Step Mode, T: terminated */
 /* clang-format off */
-#define HSEP_FMI3_ACCESS(CALL, type) \
-    CALL(fmi3Get##type,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3Set##type,                HSEP_I | HSEP_M | HSEP_S)
-#define HSEP_FMI3_CALLS(CALL) \
-    CALL(fmi3SetDebugLogging,          HSEP_I | HSEP_C | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3EnterConfigurationMode,   HSEP_I) \
-    CALL(fmi3ExitConfigurationMode,             HSEP_C) \
-    CALL(fmi3EnterInitializationMode,  HSEP_I) \
-    CALL(fmi3ExitInitializationMode,                     HSEP_M) \
-    CALL(fmi3Terminate,                                           HSEP_S) \
-    CALL(fmi3Reset,                    HSEP_I | HSEP_C | HSEP_M | HSEP_S | HSEP_T) \
-    HSEP_FMI3_ACCESS(CALL, Float32) HSEP_FMI3_ACCESS(CALL, Float64) HSEP_FMI3_ACCESS(CALL, Boolean) \
-    HSEP_FMI3_ACCESS(CALL, Int8)    HSEP_FMI3_ACCESS(CALL, Int16)   HSEP_FMI3_ACCESS(CALL, Int32) \
-    HSEP_FMI3_ACCESS(CALL, UInt8)   HSEP_FMI3_ACCESS(CALL, UInt16)  HSEP_FMI3_ACCESS(CALL, UInt32) \
-    HSEP_FMI3_ACCESS(CALL, Int64)   HSEP_FMI3_ACCESS(CALL, String)  HSEP_FMI3_ACCESS(CALL, Binary) \
-    CALL(fmi3GetUInt64,                HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3SetUInt64,                HSEP_I | HSEP_C) \
-    CALL(fmi3GetFMUState,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3SetFMUState,              HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3FreeFMUState,             HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3SerializedFMUStateSize,   HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3SerializeFMUState,        HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3DeserializeFMUState,      HSEP_I | HSEP_M | HSEP_S | HSEP_T) \
-    CALL(fmi3DoStep,                                              HSEP_S)
+#define HSEP_FMI3_ACCESS(type) \
+    HSEP_LEGAL(fmi3Get##type,                HSEP_I | HSEP_M | HSEP_S | HSEP_T); \
+    HSEP_LEGAL(fmi3Set##type,                HSEP_I | HSEP_M | HSEP_S)
+HSEP_LEGAL(fmi3SetDebugLogging,          HSEP_I | HSEP_C | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi3EnterConfigurationMode,   HSEP_I);
+HSEP_LEGAL(fmi3ExitConfigurationMode,             HSEP_C);
+HSEP_LEGAL(fmi3EnterInitializationMode,  HSEP_I);
+HSEP_LEGAL(fmi3ExitInitializationMode,                     HSEP_M);
+HSEP_LEGAL(fmi3Terminate,                                           HSEP_S);
+HSEP_LEGAL(fmi3Reset,                    HSEP_I | HSEP_C | HSEP_M | HSEP_S | HSEP_T);
+HSEP_FMI3_ACCESS(Float32); HSEP_FMI3_ACCESS(Float64); HSEP_FMI3_ACCESS(Boolean);
+HSEP_FMI3_ACCESS(Int8); HSEP_FMI3_ACCESS(Int16); HSEP_FMI3_ACCESS(Int32);
+HSEP_FMI3_ACCESS(UInt8); HSEP_FMI3_ACCESS(UInt16); HSEP_FMI3_ACCESS(UInt32);
+HSEP_FMI3_ACCESS(Int64); HSEP_FMI3_ACCESS(String); HSEP_FMI3_ACCESS(Binary);
+HSEP_LEGAL(fmi3GetUInt64,                HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi3SetUInt64,                HSEP_I | HSEP_C);
+HSEP_LEGAL(fmi3GetFMUState,              HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi3SetFMUState,              HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi3FreeFMUState,             HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi3SerializedFMUStateSize,   HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi3SerializeFMUState,        HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi3DeserializeFMUState,      HSEP_I | HSEP_M | HSEP_S | HSEP_T);
+HSEP_LEGAL(fmi3DoStep,                                              HSEP_S);
 /* clang-format on */
-HSEP_FMI3_CALLS(HSEP_CALL_ROW)
 
 static size_t fmi3_n_windows(const hsep_context *context) { return context->window > 0 ? HSEP_N_WINDOWS : 0; }
 

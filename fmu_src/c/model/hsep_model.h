@@ -7,7 +7,8 @@
  * one copy of its bytes. Outputs change only where their sample does, so what an adapter saves is the state together
  * with the values. Numbers lie in memory and in files as a little-endian machine has them.
  *
- * Nothing here allocates. Each function is reentrant; two threads may use two different instances at once.
+ * Nothing here allocates. Each function is reentrant; two threads may use two different instances at once. A message is
+ * an empty text of HSEP_MESSAGE_SIZE bytes before each call.
  */
 #ifndef HSEP_MODEL_H
 #define HSEP_MODEL_H

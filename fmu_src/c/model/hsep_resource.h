@@ -1,8 +1,17 @@
-/* Files of the FMU's resources folder. There are none with HSEP_NO_FILES. */
+/* The FMU's resources: their folder, and its files. There are none with HSEP_NO_FILES. */
 #ifndef HSEP_RESOURCE_H
 #define HSEP_RESOURCE_H
 
 #include "hsep_api.h"
+
+/* Bytes that the folder of a URI of this length needs: a trailing slash and the final 0 are added. */
+#define HSEP_FOLDER_SIZE(uri_length) ((uri_length) + 2)
+
+/* Write the folder, percent-decoded (UTF-8 stays as it is) and with a trailing slash; return 1.
+ * windows says whether /C:/x means C:/x and //server/share is a place. A text without a scheme is taken as a path, as
+ * it is: FMI 3.0's importers give one. Return 0, with nothing to be used in folder, if it is another scheme, another
+ * host, or names nothing. */
+HSEP_API int hsep_uri_folder(const char *uri, int windows, char *folder);
 
 #ifndef HSEP_NO_FILES
 

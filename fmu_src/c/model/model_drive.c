@@ -90,7 +90,7 @@ static hsep_status drive_check(const hsep_context *context, const double values[
 {
     const hsep_mode *modes = hsep_table_modes(context, values);
     const hsep_stage_settings settings = stage_settings(values);
-    *bytes = hsep_stage_size(context->n_modes, &settings);
+    *bytes = hsep_stage_lay_out(&(hsep_stage){0}, context->n_modes, &settings);
     for (size_t i = 0; i < context->n_modes; i++) {
         const double rate = hsep_plant_mode_rate(&modes[i]);
         if (rate > HSEP_PLANT_RATE_MAX) {
@@ -125,7 +125,6 @@ static hsep_status drive_step(hsep_stage *self, double x_d, double h, char messa
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     double bytes = 0.0;
-    message[0] = '\0';
     if (hsep_check_parameters(context, values, message) > 0 ||
         drive_check(context, values, &bytes, message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -164,7 +163,6 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
 {
     drive_state *self = state;
     const double x_d = values[HSEP_VR_x_d], rate = DRIVE(rate)(&self->plant);
-    message[0] = '\0';
     if (hsep_check_position(context, "x_d", x_d, " at t = %g s", t, message) != HSEP_OK ||
         hsep_check_step_size(h, message) != HSEP_OK ||
         hsep_check_point(self->end, t, drive_time_tolerance * h, message) != HSEP_OK) {
@@ -185,7 +183,6 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
 
 HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[])
 {
-    message[0] = '\0';
     return hsep_check_position(context, "the start value of x_d", values[HSEP_VR_x_d], "", 0.0, message);
 }
 

@@ -299,7 +299,6 @@ static hsep_status online_checked(
     size_t *size, char message[])
 {
     const double Np = values[HSEP_VR_Np], p = values[HSEP_VR_p], q = values[HSEP_VR_q];
-    message[0] = '\0';
     if (hsep_check_parameters(context, values, message) > 0) {
         return HSEP_REFUSED;
     }
@@ -432,7 +431,6 @@ HSEP_API hsep_status hsep_model_initialise(
 
 HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[])
 {
-    message[0] = '\0';
     return hsep_check_position(context, "the start value of x_d_ahead", values[HSEP_VR_x_d_ahead], "", 0.0, message);
 }
 
@@ -443,7 +441,6 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     hsep_predictor *predictor = online_predictor(&self->online);
     const int may_miss = hsep_residual_averaged(hsep_predictor_model(predictor)) != NULL;
     online_step step;
-    message[0] = '\0';
     if (online_converges(predictor, message) != HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;
     }

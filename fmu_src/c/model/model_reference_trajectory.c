@@ -85,7 +85,6 @@ static hsep_status trajectory_bytes(uint64_t count, size_t *size, char message[]
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     uint64_t count = 0;
-    message[0] = '\0';
     FILE *file = trajectory_open(context, values, &count, message);
     if (file == NULL) {
         return HSEP_REFUSED;
@@ -100,7 +99,6 @@ HSEP_API hsep_status hsep_model_initialise(
     trajectory_state *self = state;
     size_t needed = 0;
     uint64_t count = 0;
-    message[0] = '\0';
     if (hsep_check_clock(&self->clock, t_start, values[HSEP_VR_T_s], message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
@@ -133,7 +131,6 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     (void)context;
     trajectory_state *self = state;
     hsep_clock_step step;
-    message[0] = '\0';
     if (hsep_check_step(&self->clock, t, h, &step, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
@@ -144,8 +141,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
 
 HSEP_API hsep_status hsep_model_check_start(const hsep_context *context, const double values[], char message[])
 {
-    (void)context, (void)values; /* it has no input */
-    message[0] = '\0';
+    (void)context, (void)values, (void)message; /* it has no input */
     return HSEP_OK;
 }
 

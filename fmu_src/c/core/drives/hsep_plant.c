@@ -72,8 +72,7 @@ HSEP_API int hsep_feed_drive_step(hsep_feed_drive *self, double x_d, double h, d
     return 1;
 }
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static double stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings)
+HSEP_API double hsep_stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings)
 {
     double end = HSEP_WORDS(hsep_stage);
     self->settings = *settings;
@@ -89,28 +88,20 @@ static double stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage
     return end * sizeof(double);
 }
 
-HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings)
-{
-    return stage_lay_out(&(hsep_stage){0}, n_modes, settings);
-}
-
 /* Work space of a step, (8 n_modes,), zeros between steps. */
 static inline double *stage_work(hsep_stage *self) { return hsep_at(self, self->line) + self->n_line; }
 
-static const hsep_stage_mode *stage_modes(const hsep_stage *self)
-{
-    return (const hsep_stage_mode *)hsep_at_const(self, self->modes);
-}
+static const hsep_stage_mode *stage_modes(const hsep_stage *self) { return hsep_part_const(self, self->modes); }
 
 HSEP_API void hsep_stage_init(
     hsep_stage *self, const hsep_mode modes[], uint64_t n_modes, const hsep_stage_settings *settings, double T_s,
     double start)
 {
-    memset(self, 0, (size_t)hsep_stage_size(n_modes, settings));
-    (void)stage_lay_out(self, n_modes, settings);
+    memset(self, 0, (size_t)hsep_stage_lay_out(self, n_modes, settings));
+    (void)hsep_stage_lay_out(self, n_modes, settings);
     (void)hsep_clock_init(&self->clock, 0.0, T_s);
     self->start = start;
-    hsep_stage_mode *stage = (hsep_stage_mode *)hsep_at(self, self->modes);
+    hsep_stage_mode *stage = hsep_part(self, self->modes);
     for (uint64_t i = 0; i < n_modes; i++) {
         const double omega = HSEP_TWO_PI * modes[i].f_n;
         stage[i].omega2 = omega * omega;

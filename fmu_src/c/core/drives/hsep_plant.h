@@ -81,8 +81,8 @@ HSEP_ASSERT_WORDS(hsep_stage_mode, 4);
 HSEP_ASSERT_WORDS(hsep_stage_settings, 6);
 HSEP_ASSERT_WORDS(hsep_stage, 23);
 
-/* Bytes of the block. */
-HSEP_API double hsep_stage_size(uint64_t n_modes, const hsep_stage_settings *settings);
+/* Set what follows from the parameters; return the bytes of the block. */
+HSEP_API double hsep_stage_lay_out(hsep_stage *self, uint64_t n_modes, const hsep_stage_settings *settings);
 
 /* Reset the stage to rest at start, m. modes: (n_modes,), settings: neither of them in the block. */
 HSEP_API void hsep_stage_init(

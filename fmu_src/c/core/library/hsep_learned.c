@@ -66,54 +66,70 @@ static int learned_take(hsep_learned_bytes *from, const hsep_learned_head *head,
     return from->left == sizeof(uint64_t);
 }
 
-/* The number of a mode by the name that the file has it under, mode[1].f_n; NULL if there is none. */
-static const hsep_real *learned_mode_number(const hsep_parameters *parameters, const char *name)
+/* A setting as a file has it under its name: of the predictor with mode = 0, or of one of its modes, from 1 on. */
+static hsep_learned_setting learned_setting(uint64_t mode, const char *name, double value)
 {
-    uint64_t mode = 0;
-    if (strncmp(name, "mode[", 5) != 0) {
-        return NULL;
+    hsep_learned_setting setting = {{0}, value};
+    size_t at = 0;
+    if (mode > 0) {
+        uint64_t place = 1;
+        memcpy(setting.name, "mode[", 5);
+        for (at = 5; place <= mode / 10; place *= 10) {}
+        for (; place > 0; place /= 10) {
+            setting.name[at++] = (char)('0' + mode / place % 10);
+        }
+        memcpy(setting.name + at, "].", 2);
+        at += 2;
     }
-    for (name += 5; *name >= '0' && *name <= '9'; name++) {
-        mode = 10 * mode + (uint64_t)(*name - '0');
+    for (; *name != '\0'; name++) {
+        setting.name[at++] = *name;
     }
-    if (strncmp(name, "].", 2) != 0 || mode < 1 || mode > parameters->n_modes) {
-        return NULL;
-    }
-    const hsep_mode *found = &parameters->modes[mode - 1];
-#define NUMBER(of, type, number, ...) \
-    if (strcmp(name + 2, #number) == 0) { \
-        return &found->number; \
-    }
-    HSEP_MODE_SETTINGS(NUMBER)
-#undef NUMBER
-    return NULL;
+    return setting;
 }
 
-/* Whether a setting of the file is one that weights depend on, and has this value now. */
-static int learned_agrees(const hsep_learned_setting *setting, const hsep_parameters *parameters)
+#define COUNT(of, type, own, usual, least, most, nonzero, automatic, learned) +(learned)
+enum { LEARNED_OWN = 0 HSEP_PREDICTOR_SETTINGS(COUNT) HSEP_AVERAGING_SETTINGS(COUNT) };
+#undef COUNT
+
+/* Write the settings that weights depend on: the predictor's own with mode = 0, or those of a mode; return how many. */
+static uint64_t learned_settings(const hsep_parameters *parameters, uint64_t mode, hsep_learned_setting to[LEARNED_OWN])
 {
-    const hsep_real *number = learned_mode_number(parameters, setting->name);
-    if (number != NULL) {
-        return *number == (hsep_real)setting->value;
+    uint64_t n = 0;
+    if (mode > 0) {
+#define OF_MODE(of, type, own, ...) to[n++] = learned_setting(mode, #own, (double)parameters->modes[mode - 1].own);
+        HSEP_MODE_SETTINGS(OF_MODE)
+#undef OF_MODE
+        return n;
     }
-#define SAME(of, type, own, usual, least, most, nonzero, automatic, learned) \
-    if (learned && strcmp(setting->name, #own) == 0) { \
-        return (hsep_real)parameters->of.own == (hsep_real)setting->value; \
+#define OWN(of, type, own, usual, least, most, nonzero, automatic, learned) \
+    if (learned) { \
+        to[n++] = learned_setting(0, #own, (double)parameters->of.own); \
     }
-    HSEP_PREDICTOR_SETTINGS(SAME)
-    HSEP_AVERAGING_SETTINGS(SAME)
-#undef SAME
-    return 0;
+    HSEP_PREDICTOR_SETTINGS(OWN)
+    HSEP_AVERAGING_SETTINGS(OWN)
+#undef OWN
+    return n;
 }
 
 /* Settings that weights depend on, the modes' numbers among them. */
 static uint64_t learned_n_settings(const hsep_parameters *parameters)
 {
-#define COUNT(of, type, own, usual, least, most, nonzero, automatic, learned) +(learned)
-    const uint64_t n = 0 HSEP_PREDICTOR_SETTINGS(COUNT) HSEP_AVERAGING_SETTINGS(COUNT);
-    const uint64_t n_mode = 0 HSEP_MODE_SETTINGS(COUNT);
-#undef COUNT
-    return n + n_mode * parameters->n_modes;
+    hsep_learned_setting own[LEARNED_OWN];
+    return LEARNED_OWN + parameters->n_modes * learned_settings(parameters, 1, own);
+}
+
+/* Whether a setting of the file is one that weights depend on, and has this value now. */
+static int learned_agrees(const hsep_learned_setting *setting, const hsep_parameters *parameters)
+{
+    hsep_learned_setting own[LEARNED_OWN];
+    for (uint64_t mode = 0; mode <= parameters->n_modes; mode++) {
+        for (uint64_t i = learned_settings(parameters, mode, own); i-- > 0;) {
+            if (strcmp(setting->name, own[i].name) == 0) {
+                return (hsep_real)setting->value == (hsep_real)own[i].value;
+            }
+        }
+    }
+    return 0;
 }
 
 HSEP_API hsep_began
@@ -143,27 +159,6 @@ hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, 
     return learned_take(&from, &head, predictor) ? HSEP_BEGAN : HSEP_WEIGHTS_DAMAGED;
 }
 
-/* Write a setting of a file under a name: of the predictor with mode = 0, or of one of its modes, from 1 on. */
-static hsep_learned_setting learned_setting(uint64_t mode, const char *name, double value)
-{
-    hsep_learned_setting setting = {{0}, value};
-    size_t at = 0;
-    if (mode > 0) {
-        uint64_t place = 1;
-        memcpy(setting.name, "mode[", 5);
-        for (at = 5; place <= mode / 10; place *= 10) {}
-        for (; place > 0; place /= 10) {
-            setting.name[at++] = (char)('0' + mode / place % 10);
-        }
-        memcpy(setting.name + at, "].", 2);
-        at += 2;
-    }
-    for (; *name != '\0'; name++) {
-        setting.name[at++] = *name;
-    }
-    return setting;
-}
-
 /* Write n numbers as doubles; they may lie at the end of where they go. */
 static double *learned_put(double to[], const hsep_real from[], hsep_int n)
 {
@@ -174,9 +169,9 @@ static double *learned_put(double to[], const hsep_real from[], hsep_int n)
 }
 
 HSEP_API size_t
-hsep_learned_write(hsep_predictor *predictor, const hsep_parameters *parameters, void *bytes, size_t size)
+hsep_predictor_weights(hsep_predictor *self, const hsep_parameters *parameters, void *bytes, size_t size)
 {
-    hsep_residual_model *model = hsep_predictor_model(predictor);
+    hsep_residual_model *model = hsep_predictor_model(self);
     const hsep_int n_learned = hsep_residual_n_learned(model);
     hsep_learned_head head = {{0}, learned_n_settings(parameters), parameters->n_modes, HSEP_N_UNCERTAINTY + n_learned};
     memcpy(head.magic, HSEP_LEARNED_MAGIC, sizeof head.magic);
@@ -191,21 +186,11 @@ hsep_learned_write(hsep_predictor *predictor, const hsep_parameters *parameters,
     }
     memcpy(bytes, &head, sizeof head);
     hsep_learned_setting *setting = (hsep_learned_setting *)((unsigned char *)bytes + sizeof head);
-#define WRITE(of, type, own, usual, least, most, nonzero, automatic, learned) \
-    if (learned) { \
-        *setting++ = learned_setting(0, #own, (double)parameters->of.own); \
-    }
-    HSEP_PREDICTOR_SETTINGS(WRITE)
-    HSEP_AVERAGING_SETTINGS(WRITE)
-#undef WRITE
-    for (uint64_t mode = 1; mode <= parameters->n_modes; mode++) {
-#define WRITE(of, type, number, ...) \
-    *setting++ = learned_setting(mode, #number, (double)parameters->modes[mode - 1].number);
-        HSEP_MODE_SETTINGS(WRITE)
-#undef WRITE
+    for (uint64_t mode = 0; mode <= parameters->n_modes; mode++) {
+        setting += learned_settings(parameters, mode, setting);
     }
     double *to = learned_put((double *)(void *)setting, hsep_residual_learned(model), n_learned);
-    to = learned_put(to, hsep_predictor_uncertainty(predictor)->theta, HSEP_N_UNCERTAINTY);
+    to = learned_put(to, hsep_predictor_uncertainty(self)->theta, HSEP_N_UNCERTAINTY);
     for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
         const hsep_int count = (hsep_int)hsep_triangle(hsep_residual_n_features(model, i) + 1);
         hsep_real *triangle = (hsep_real *)(void *)(to + 1 + count) - count; /* at the end of where it goes */

@@ -41,10 +41,6 @@ HSEP_API int hsep_learned_read(hsep_learned_bytes *from, void *to, size_t size);
 /* Read the next setting; 0 if there is none, or its name does not end. */
 HSEP_API int hsep_learned_next(hsep_learned_bytes *from, hsep_learned_setting *setting);
 
-/* As hsep_predictor_weights. */
-HSEP_API size_t
-hsep_learned_write(hsep_predictor *predictor, const hsep_parameters *parameters, void *bytes, size_t size);
-
 /* Take all of the bytes of a file, or NULL. HSEP_BEGAN: taken; otherwise the predictor may have changed. */
 HSEP_API hsep_began
 hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, const void *bytes, size_t size);

@@ -30,5 +30,5 @@ HSEP_API hsep_began hsep_compensator_init(
 HSEP_API size_t
 hsep_compensator_weights(hsep_compensator *self, const hsep_parameters *parameters, void *bytes, size_t size)
 {
-    return hsep_learned_write(hsep_compensator_predictor(self), parameters, bytes, size);
+    return hsep_predictor_weights(hsep_compensator_predictor(self), parameters, bytes, size);
 }

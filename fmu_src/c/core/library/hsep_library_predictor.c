@@ -1,4 +1,5 @@
-/* The library's predictor: its size and beginning from the settings; the rest is hsep_predictor.c's. */
+/* The library's predictor: its size and beginning from the settings; the rest is hsep_predictor.c's, and
+ * hsep_learned.c's. */
 #include "hsep_learned.h"
 #include "hsep_parameters.h"
 #include "hsep_predictor.h"
@@ -22,10 +23,4 @@ HSEP_API hsep_began hsep_predictor_init(
         hsep_predictor_block_init(self, &derived, start);
     }
     return began;
-}
-
-HSEP_API size_t
-hsep_predictor_weights(hsep_predictor *self, const hsep_parameters *parameters, void *bytes, size_t size)
-{
-    return hsep_learned_write(self, parameters, bytes, size);
 }

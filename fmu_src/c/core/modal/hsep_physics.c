@@ -99,10 +99,7 @@ static hsep_real physics_lay_out(hsep_physics *self, hsep_int n_modes, hsep_int 
     return end * sizeof(hsep_real);
 }
 
-static hsep_discrete_mode *physics_modes(hsep_physics *self)
-{
-    return (hsep_discrete_mode *)hsep_at(self, self->modes);
-}
+static hsep_discrete_mode *physics_modes(hsep_physics *self) { return hsep_part(self, self->modes); }
 
 HSEP_API hsep_real hsep_physics_size(hsep_int n_modes, hsep_int dead_time)
 {
@@ -130,7 +127,7 @@ HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[])
 
 HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other)
 {
-    const hsep_discrete_mode *modes = (const hsep_discrete_mode *)hsep_at_const(other, other->modes);
+    const hsep_discrete_mode *modes = hsep_part_const(other, other->modes);
     const hsep_real *ring = hsep_at_const(other, other->ring);
     for (hsep_int i = 0; i < self->n_modes; i++) {
         physics_modes(self)[i].s[0] += modes[i].s[0];

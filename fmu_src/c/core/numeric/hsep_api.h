@@ -8,11 +8,8 @@
 #ifndef HSEP_API_H
 #define HSEP_API_H
 
-#ifdef __FAST_MATH__
-#error "hsep needs IEEE 754 arithmetic, NaN and the order of operations as written: compile without -ffast-math"
-#endif
-#ifdef _M_FP_FAST
-#error "hsep needs IEEE 754 arithmetic, NaN and the order of operations as written: compile without /fp:fast"
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
+#error "hsep needs IEEE 754 arithmetic, NaN and the order of operations as written: no -ffast-math, no /fp:fast"
 #endif
 
 #ifndef HSEP_API

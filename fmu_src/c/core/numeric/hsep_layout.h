@@ -39,11 +39,15 @@ static inline hsep_int hsep_take_block(hsep_real *end, hsep_real bytes)
     return hsep_take(end, bytes / sizeof(hsep_real));
 }
 
-/* The array, or the block, at an offset of a block. */
+/* The array at an offset of a block, */
 static inline hsep_real *hsep_at(void *block, hsep_int offset) { return (hsep_real *)block + offset; }
 static inline const hsep_real *hsep_at_const(const void *block, hsep_int offset)
 {
     return (const hsep_real *)block + offset;
 }
+
+/* and the block there, which may be of any type. */
+static inline void *hsep_part(void *block, hsep_int offset) { return hsep_at(block, offset); }
+static inline const void *hsep_part_const(const void *block, hsep_int offset) { return hsep_at_const(block, offset); }
 
 #endif

@@ -75,7 +75,7 @@ HSEP_API void hsep_predictor_block_init(
     const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
     hsep_residual_init(hsep_predictor_model(self), &model, start);
     if (self->motion) {
-        hsep_start_init((hsep_start *)hsep_at(self, self->motion), &model);
+        hsep_start_init(hsep_part(self, self->motion), &model);
     }
 }
 
@@ -93,7 +93,7 @@ HSEP_API hsep_residual_window hsep_predictor_window(hsep_predictor *self)
 static int predictor_settled(hsep_predictor *self)
 {
     const int is_first = self->motion && self->k < self->preview + self->Np;
-    const hsep_start *motion = (const hsep_start *)hsep_at_const(self, self->motion);
+    const hsep_start *motion = hsep_part_const(self, self->motion);
     return self->n_published == self->Np && !(is_first && hsep_start_moves(motion, hsep_at(self, self->command)));
 }
 
@@ -106,13 +106,13 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, h
     const hsep_real x_d = hsep_at(self, self->x_d - late)[i], x_pb = hsep_at(self, self->x_pb - late)[i];
     const hsep_real x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
-    hsep_residual_append_command(hsep_predictor_model(self), x_d_ahead - self->start);
     hsep_at(self, self->past_e)[j] = learned - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
     const hsep_residual_window window = hsep_predictor_window(self);
     const hsep_residual_sample sample = {
         .i = i,
         .settled = predictor_settled(self),
         .relative = learned - self->start,
+        .command = x_d_ahead - self->start,
         .x = hsep_at(self, self->past_x) + j,
         .e = hsep_at(self, self->past_e) + j};
     hsep_residual_take_in(hsep_predictor_model(self), &window, &sample);
@@ -134,7 +134,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, h
 static void predictor_start(hsep_predictor *self)
 {
     const hsep_int Np = self->Np, late = self->late;
-    hsep_start *motion = (hsep_start *)hsep_at(self, self->motion);
+    hsep_start *motion = hsep_part(self, self->motion);
     hsep_uncertainty *uncertainty = hsep_predictor_uncertainty(self);
     hsep_averaged *averaged = hsep_residual_averaged(hsep_predictor_model(self));
     hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
@@ -291,7 +291,7 @@ HSEP_API void hsep_predictor_complete(hsep_predictor *self)
 
 HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_int i)
 {
-    const hsep_uncertainty *uncertainty = (const hsep_uncertainty *)hsep_at_const(self, self->uncertainty);
+    const hsep_uncertainty *uncertainty = hsep_part_const(self, self->uncertainty);
     return hsep_fmax(hsep_at_const(uncertainty, uncertainty->std)[self->Np - 1 - i], uncertainty->least);
 }
 
@@ -312,7 +312,7 @@ HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_out
     outputs->rms_h = predictor_rms(self, self->sum_h);
     outputs->rms_hold = predictor_rms(self, self->sum_hold);
     outputs->batch = self->k / self->Np;
-    outputs->n_rejected = hsep_residual_n_rejected((const hsep_residual_model *)hsep_at_const(self, self->model));
+    outputs->n_rejected = hsep_residual_n_rejected(hsep_part_const(self, self->model));
     outputs->hybrid_active = i >= self->n_physics;
     outputs->divergence = (hsep_divergence)self->divergence;
 }

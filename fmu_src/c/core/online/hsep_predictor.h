@@ -84,17 +84,11 @@ HSEP_API void hsep_predictor_block_init(
     hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
 /* Parts of the block: the physics model, the residual model, and what is known of the errors of x_h. */
-static inline hsep_physics *hsep_predictor_physics(hsep_predictor *self)
-{
-    return (hsep_physics *)hsep_at(self, self->physics);
-}
-static inline hsep_residual_model *hsep_predictor_model(hsep_predictor *self)
-{
-    return (hsep_residual_model *)hsep_at(self, self->model);
-}
+static inline hsep_physics *hsep_predictor_physics(hsep_predictor *self) { return hsep_part(self, self->physics); }
+static inline hsep_residual_model *hsep_predictor_model(hsep_predictor *self) { return hsep_part(self, self->model); }
 static inline hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self)
 {
-    return (hsep_uncertainty *)hsep_at(self, self->uncertainty);
+    return hsep_part(self, self->uncertainty);
 }
 
 HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters);

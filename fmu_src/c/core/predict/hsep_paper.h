@@ -33,10 +33,7 @@ HSEP_API hsep_real hsep_paper_lay_out(hsep_paper *self, const hsep_predictor_set
 /* Fill the block, which is 0. */
 HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *settings);
 
-static inline hsep_regression *hsep_paper_regression(hsep_paper *self)
-{
-    return (hsep_regression *)hsep_at(self, self->regression);
-}
+static inline hsep_regression *hsep_paper_regression(hsep_paper *self) { return hsep_part(self, self->regression); }
 
 /* Fold the row of a sample into the regression; eqs. (5) and (6). Costs a hsep_regression_fold. */
 HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_residual_sample *sample);

@@ -110,13 +110,6 @@ HSEP_API void hsep_residual_restart(hsep_residual_model *self)
     }
 }
 
-HSEP_API void hsep_residual_append_command(hsep_residual_model *self, hsep_real command)
-{
-    if (self->averaged) {
-        hsep_recall_append_command(hsep_averaged_recall(hsep_residual_averaged(self)), command);
-    }
-}
-
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning)
 {
     self->learning = learning != 0;
@@ -154,6 +147,7 @@ HSEP_API void hsep_residual_take_in(
 {
     if (self->averaged) {
         hsep_averaged *averaged = hsep_residual_averaged(self);
+        hsep_recall_append_command(hsep_averaged_recall(averaged), sample->command);
         hsep_at(averaged, averaged->measured)[self->Np - 1 - sample->i] = sample->relative;
         if (self->learning && sample->settled) {
             hsep_averaged_follow(

@@ -29,11 +29,11 @@ HSEP_API void hsep_residual_init(
 /* The implementation; NULL if it is the other one. */
 static inline hsep_paper *hsep_residual_paper(hsep_residual_model *self)
 {
-    return self->paper ? (hsep_paper *)hsep_at(self, self->paper) : NULL;
+    return self->paper ? hsep_part(self, self->paper) : NULL;
 }
 static inline hsep_averaged *hsep_residual_averaged(hsep_residual_model *self)
 {
-    return self->averaged ? (hsep_averaged *)hsep_at(self, self->averaged) : NULL;
+    return self->averaged ? hsep_part(self, self->averaged) : NULL;
 }
 
 /* Factors [R z; 0 rho] that are learned, for a warm start before the first sample: their number, and the features of
@@ -59,9 +59,6 @@ HSEP_API hsep_real *hsep_residual_learned(hsep_residual_model *self);
 
 /* Begin a run with what an earlier one has learned, once it is loaded into a fresh block. */
 HSEP_API void hsep_residual_restart(hsep_residual_model *self);
-
-/* Take in the command that comes next, as it came, m, relative to the start. */
-HSEP_API void hsep_residual_append_command(hsep_residual_model *self, hsep_real command);
 
 /* Begin a window whose residuals before it are known. learning: whether it is learned. */
 HSEP_API void hsep_residual_begin(hsep_residual_model *self, int learning);
@@ -98,7 +95,7 @@ static inline const hsep_real *hsep_residual_accepted(hsep_residual_model *self)
 /* Measurements of this run that were missing or not plausible. */
 static inline hsep_int hsep_residual_n_rejected(const hsep_residual_model *self)
 {
-    return self->averaged ? ((const hsep_averaged *)hsep_at_const(self, self->averaged))->n_rejected : 0;
+    return self->averaged ? ((const hsep_averaged *)hsep_part_const(self, self->averaged))->n_rejected : 0;
 }
 
 #endif

@@ -29,6 +29,7 @@ typedef struct {
 typedef struct {
     hsep_int i;             /* sample of the window, 0 ... Np - 1 */
     hsep_real relative;     /* m, measured position relative to the start */
+    hsep_real command;      /* m, command that came with it, as it came, relative to the start */
     const hsep_real *x, *e; /* the window's x_pb and e from this sample on, and before it */
     int settled;            /* whether the window's commands and x_pb will not change any more */
 } hsep_residual_sample;

@@ -97,23 +97,17 @@ HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parame
 /* Parts of the block; of the experts not hold. */
 static inline hsep_disturbances *hsep_averaged_disturbances(hsep_averaged *self)
 {
-    return (hsep_disturbances *)hsep_at(self, self->disturbances);
+    return hsep_part(self, self->disturbances);
 }
-static inline hsep_command *hsep_averaged_command(hsep_averaged *self)
-{
-    return (hsep_command *)hsep_at(self, self->command);
-}
-static inline hsep_recall *hsep_averaged_recall(hsep_averaged *self)
-{
-    return (hsep_recall *)hsep_at(self, self->recall);
-}
+static inline hsep_command *hsep_averaged_command(hsep_averaged *self) { return hsep_part(self, self->command); }
+static inline hsep_recall *hsep_averaged_recall(hsep_averaged *self) { return hsep_part(self, self->recall); }
 static inline hsep_warm_start *hsep_averaged_evidence(hsep_averaged *self, hsep_int kind)
 {
-    return (hsep_warm_start *)hsep_at(self, self->evidence[kind]);
+    return hsep_part(self, self->evidence[kind]);
 }
 static inline hsep_expert *hsep_averaged_expert(hsep_averaged *self, hsep_int expert)
 {
-    return (hsep_expert *)hsep_at(self, self->experts[expert]);
+    return hsep_part(self, self->experts[expert]);
 }
 
 /* HSEP_COMMAND_RESIDUAL if an expert predicts the residual of the command, else HSEP_MODEL_RESIDUAL. */

@@ -58,15 +58,12 @@ HSEP_API void hsep_residual_scale_follow(
 HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape);
 HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
 
-static inline hsep_solution *hsep_expert_solution(hsep_expert *self)
-{
-    return (hsep_solution *)hsep_at(self, self->solution);
-}
+static inline hsep_solution *hsep_expert_solution(hsep_expert *self) { return hsep_part(self, self->solution); }
 
 /* Weights of the features without lags, then of the lags, (n_static + p,). */
 static inline const hsep_real *hsep_expert_weights(const hsep_expert *self)
 {
-    const hsep_solution *solution = (const hsep_solution *)hsep_at_const(self, self->solution);
+    const hsep_solution *solution = hsep_part_const(self, self->solution);
     return hsep_at_const(solution, solution->weights);
 }
 

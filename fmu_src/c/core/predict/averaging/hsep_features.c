@@ -5,7 +5,7 @@
 /* Filter i before the window; behind all of these are the filters after the samples that were tried. */
 static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_int i)
 {
-    return (hsep_physics *)hsep_at(self, self->filters + i * self->filter_words);
+    return hsep_part(self, self->filters + i * self->filter_words);
 }
 
 HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep_residual_parameters *parameters)

@@ -43,16 +43,16 @@ HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *
         within[i] = (hsep_real)i - late;
     }
     hsep_physics_init(
-        (hsep_physics *)hsep_at(self, self->trial), parameters->modes, parameters->n_modes, settings->dead_time,
-        settings->T_s, (hsep_hold)settings->input_hold);
-    hsep_regression_init((hsep_regression *)hsep_at(self, self->regression), self->n_states, HSEP_START_DAMPING);
+        hsep_part(self, self->trial), parameters->modes, parameters->n_modes, settings->dead_time, settings->T_s,
+        (hsep_hold)settings->input_hold);
+    hsep_regression_init(hsep_part(self, self->regression), self->n_states, HSEP_START_DAMPING);
 }
 
 /* Response x_pb, (count,), m, to the state that is tried, and to a command that comes to 0 by step m a sample while the
  * measurement is late. */
 static void start_respond(hsep_start *self, hsep_real step, hsep_real x_pb[], hsep_int count)
 {
-    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
+    hsep_physics *trial = hsep_part(self, self->trial);
     const hsep_int late = self->n - self->Np;
     hsep_physics_begin(trial, hsep_at(self, self->state));
     for (hsep_int k = 0; k < count; k++) {
@@ -82,7 +82,7 @@ HSEP_API int hsep_start_moves(const hsep_start *self, const hsep_real x_d[])
 /* Fold the residuals that the motion leaves, and the responses to the states, into the regression. */
 static void start_fold(hsep_start *self, const hsep_real e[])
 {
-    hsep_regression *regression = (hsep_regression *)hsep_at(self, self->regression);
+    hsep_regression *regression = hsep_part(self, self->regression);
     const hsep_real *response = hsep_at(self, self->response), *responses = hsep_at(self, self->responses);
     hsep_regression_init(regression, self->n_states, HSEP_START_DAMPING);
     for (hsep_int k = 0; k < self->Np; k++) {
@@ -152,5 +152,5 @@ HSEP_API void hsep_start_apply(
     for (hsep_int i = 0; i < self->Np; i++) {
         ahead[i] += response[self->n + i];
     }
-    hsep_physics_add(physics, (const hsep_physics *)hsep_at_const(self, self->trial));
+    hsep_physics_add(physics, hsep_part_const(self, self->trial));
 }

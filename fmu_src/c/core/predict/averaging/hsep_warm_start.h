@@ -14,14 +14,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_warm_start, 2);
 
-static inline hsep_gram *hsep_warm_start_of_run(hsep_warm_start *self)
-{
-    return (hsep_gram *)hsep_at(self, self->of_run);
-}
-static inline hsep_gram *hsep_warm_start_earlier(hsep_warm_start *self)
-{
-    return (hsep_gram *)hsep_at(self, self->earlier);
-}
+static inline hsep_gram *hsep_warm_start_of_run(hsep_warm_start *self) { return hsep_part(self, self->of_run); }
+static inline hsep_gram *hsep_warm_start_earlier(hsep_warm_start *self) { return hsep_part(self, self->earlier); }
 
 /* n: features. */
 static inline hsep_real hsep_warm_start_lay_out(hsep_warm_start *self, hsep_int n)
