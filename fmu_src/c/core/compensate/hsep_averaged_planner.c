@@ -104,12 +104,10 @@ static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_a
     return error + hsep_planner_jerk(task->planner, c, hsep_at(self, self->target));
 }
 
-/* A spline that is solved for, and the sample that it begins with. */
-static hsep_knot averaged_planner_knot(const hsep_planner *planner, hsep_int i, hsep_int *begin)
+/* Samples that the splines begin with, which are solved for. */
+static hsep_int *averaged_planner_begins(hsep_averaged_planner *self)
 {
-    const hsep_knot knot = hsep_knots_at(&planner->knots, i);
-    *begin = (planner->n_pinned + knot.begin) * hsep_planner_splines(planner)->spacing;
-    return knot;
+    return (hsep_int *)hsep_at(self, self->begins);
 }
 
 /* A spline with this distance of knots. */
@@ -134,9 +132,9 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
     for (hsep_int k = 0; k < self->preview; k++) {
         target[k] = weight[k] * weight[k] * (task->x_d[k] - self->start - x_pb[self->preview - 1 - k]);
     }
-    for (hsep_int i = 0, begin; i < self->m; i++) {
-        const hsep_knot knot = averaged_planner_knot(task->planner, i, &begin);
-        const hsep_real *passed = averaged_planner_shape(self, task->planner, knot.level).passed;
+    for (hsep_int i = 0; i < self->m; i++) {
+        const hsep_int level = hsep_knots_at(&task->planner->knots, i).level, begin = averaged_planner_begins(self)[i];
+        const hsep_real *passed = averaged_planner_shape(self, task->planner, level).passed;
         v[i] = hsep_dot(passed, target + begin, self->preview - begin);
     }
     memcpy(
@@ -180,8 +178,8 @@ static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_ave
     const hsep_real *weight = hsep_at(self, self->weight);
     hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
-    hsep_int from;
-    const hsep_int level = averaged_planner_knot(task->planner, first, &from).level, apart = spacing << level;
+    const hsep_int level = hsep_knots_at(&task->planner->knots, first).level, apart = spacing << level;
+    const hsep_int from = averaged_planner_begins(self)[first];
     if (first == 0 || hsep_knots_at(&task->planner->knots, first - 1).level != level) {
         const hsep_linearised_change change = averaged_planner_shape(self, task->planner, level);
         hsep_linearised_begin(linearised, task->model, &change);
@@ -206,29 +204,29 @@ static void averaged_planner_products(hsep_averaged_planner *self, hsep_planner 
     const hsep_int m = self->m, preview = self->preview, first = self->spline;
     const hsep_int end = first + HSEP_AVERAGED_PRODUCTS < m ? first + HSEP_AVERAGED_PRODUCTS : m;
     const hsep_real *W = hsep_at(self, self->W), *target = hsep_at(self, self->target);
+    const hsep_int *begins = averaged_planner_begins(self);
     hsep_real *v = hsep_planner_linear(planner);
     hsep_real *P = hsep_planner_quadratic(planner) + (first * m - first * (first - 1) / 2);
-    for (hsep_int i = first, begin, from; i < end; i++) {
-        (void)averaged_planner_knot(planner, i, &begin);
-        for (hsep_int j = i, count; j < m; j += count, P += count) {
+    for (hsep_int i = first; i < end; i++) {
+        for (hsep_int j = i; j < m; j += 4) {
+            const hsep_int count = m - j < 4 ? m - j : 4;
             const hsep_real *rights[4];
             hsep_real sums[4];
-            hsep_int earliest = preview;
-            count = m - j < 4 ? m - j : 4;
+            hsep_int from = preview; /* where one of both begins, or before that */
             for (hsep_int c = 0; c < 4; c++) {
                 const hsep_int column = c < count ? j + c : j;
-                (void)averaged_planner_knot(planner, column, &from);
-                earliest = from < earliest ? from : earliest;
+                from = begins[column] < from ? begins[column] : from;
                 rights[c] = W + column * preview;
             }
-            earliest = earliest > begin ? earliest : begin;
+            from = from > begins[i] ? from : begins[i];
             for (hsep_int c = 0; c < 4; c++) {
-                rights[c] += earliest;
+                rights[c] += from;
             }
-            hsep_dot_four(W + i * preview + earliest, rights, preview - earliest, sums);
+            hsep_dot_four(W + i * preview + from, rights, preview - from, sums);
             memcpy(P, sums, (size_t)count * sizeof(hsep_real));
+            P += count;
         }
-        v[i] = hsep_dot(W + i * preview + begin, target + begin, preview - begin);
+        v[i] = hsep_dot(W + i * preview + begins[i], target + begins[i], preview - begins[i]);
     }
     self->spline = end;
 }
@@ -238,11 +236,13 @@ HSEP_API void hsep_averaged_planner_shape(hsep_averaged_planner *self, hsep_plan
     const hsep_splines *splines = hsep_planner_splines(plans);
     const hsep_int spacing = splines->spacing, preview = self->preview;
     const hsep_real *weight = hsep_at(self, self->weight), *b = hsep_splines_shape(splines);
-    for (hsep_int i = 0, begin; i < self->m; i++) {
-        const hsep_knot knot = averaged_planner_knot(plans, i, &begin);
+    for (hsep_int i = 0; i < self->m; i++) {
+        const hsep_knot knot = hsep_knots_at(&plans->knots, i);
+        const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
         const hsep_linearised_change change = averaged_planner_shape(self, plans, knot.level);
         hsep_real *commands = hsep_at(self, (hsep_int)(change.commands - hsep_at(self, 0)));
         hsep_real *passed = hsep_at(self, (hsep_int)(change.passed - hsep_at(self, 0)));
+        averaged_planner_begins(self)[i] = begin;
         memset(commands, 0, (size_t)change.n * sizeof(hsep_real));
         memset(passed, 0, (size_t)preview * sizeof(hsep_real));
         for (hsep_int j = 0; j < knot.length; j++) {
@@ -389,13 +389,12 @@ static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planne
 }
 
 /* Products of the columns of some splines with all behind them. */
-static hsep_real averaged_planner_of_products(
-    const hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int begin, hsep_int end)
+static hsep_real averaged_planner_of_products(hsep_averaged_planner *self, hsep_int begin, hsep_int end)
 {
     hsep_real sum = 0.0;
-    for (hsep_int i = begin, from; i < end && i < self->m; i++) {
-        (void)averaged_planner_knot(task->planner, i, &from);
-        sum += 0.5 * (hsep_real)(self->m - i) * ((hsep_real)(self->preview - from) + HSEP_WORK_NUMBER);
+    for (hsep_int i = begin; i < end && i < self->m; i++) {
+        const hsep_int length = self->preview - averaged_planner_begins(self)[i];
+        sum += 0.5 * (hsep_real)(self->m - i) * ((hsep_real)length + HSEP_WORK_NUMBER);
     }
     return sum;
 }
@@ -416,7 +415,7 @@ static hsep_real averaged_planner_vary(
 
 /* Bound on the work that is left of a plan where it begins, or behind the Newton step. */
 static hsep_real averaged_planner_left(
-    const hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work)
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work)
 {
     const hsep_linearised *linearised = (const hsep_linearised *)hsep_at_const(self, self->linearised);
     const hsep_int window = self->late + self->Np, behind = self->preview - self->Np, first = self->samples;
@@ -438,11 +437,10 @@ static hsep_real averaged_planner_left(
         left += programme + 2.0 * work->predict + (hsep_real)averaged_planner_tolerance.steps * parts;
     }
     if (self->place == 0 && self->follows) {
-        hsep_real newton = work->linearise + averaged_planner_of_products(self, task, 0, self->m) + work->factor +
+        hsep_real newton = work->linearise + averaged_planner_of_products(self, 0, self->m) + work->factor +
                            work->solve + 2.0 * HSEP_AVERAGED_TRIES * work->predict;
-        for (hsep_int i = 0, from; i < self->m; i += averaged_planner_together(self, task->planner, i)) {
-            (void)averaged_planner_knot(task->planner, i, &from);
-            newton += hsep_linearised_work(linearised, task->model, from);
+        for (hsep_int i = 0; i < self->m; i += averaged_planner_together(self, task->planner, i)) {
+            newton += hsep_linearised_work(linearised, task->model, averaged_planner_begins(self)[i]);
         }
         for (hsep_int i = 0; i < self->n_steps; i++) {
             left += newton + (hsep_real)averaged_planner_steps(self, i) * parts;
@@ -467,7 +465,6 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 {
     const averaged_planner_work work = averaged_planner_work_of(self, task);
     const hsep_int all = self->late + self->preview;
-    hsep_int from;
     hsep_planner *planner = task->planner;
     hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
@@ -547,13 +544,13 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             AVERAGED_PLANNER_YIELD(7, work.linearise);
             averaged_planner_linearise(self, task);
             for (self->spline = 0; self->spline < self->m;) {
-                (void)averaged_planner_knot(planner, self->spline, &from);
-                AVERAGED_PLANNER_YIELD(8, hsep_linearised_work(linearised, task->model, from));
+                AVERAGED_PLANNER_YIELD(
+                    8, hsep_linearised_work(linearised, task->model, averaged_planner_begins(self)[self->spline]));
                 averaged_planner_columns(self, task);
             }
             for (self->spline = 0; self->spline < self->m;) {
                 AVERAGED_PLANNER_YIELD(
-                    9, averaged_planner_of_products(self, task, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
+                    9, averaged_planner_of_products(self, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
                 averaged_planner_products(self, planner);
             }
             AVERAGED_PLANNER_YIELD(10, work.factor);

@@ -62,6 +62,7 @@ typedef struct {
     hsep_int e_h;        /* (preview + late + p,) m, and what the averaged model adds; behind it the last residuals */
     hsep_int target;     /* (preview,) m, work */
     hsep_int weight;     /* (preview,) of the errors of a plan: they count less at its end */
+    hsep_int begins;     /* (m,) hsep_int, samples that the splines begin with, which are solved for */
     hsep_int shapes;     /* (HSEP_AVERAGED_SHAPES spacing,) splines of each distance of knots, one after the other, */
     hsep_int passed;     /* (HSEP_KNOTS_LEVELS, preview) and these behind G_pb */
     hsep_int gram;       /* triangle of m rows, W' W with G_pb alone */
@@ -71,7 +72,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 43);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 44);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {

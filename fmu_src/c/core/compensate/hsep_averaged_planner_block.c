@@ -34,6 +34,7 @@ HSEP_API hsep_real hsep_averaged_planner_lay_out(
     self->e_h = hsep_take(&end, all + (hsep_real)self->p);
     self->target = hsep_take(&end, preview);
     self->weight = hsep_take(&end, preview);
+    self->begins = hsep_take(&end, (hsep_real)m);
     self->shapes = hsep_take(&end, HSEP_AVERAGED_SHAPES * (hsep_real)planner->spacing);
     self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
     self->gram = hsep_take(&end, hsep_triangle(m));

@@ -178,7 +178,7 @@ typedef struct {
     hsep_real *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
     hsep_real *factor;   /* triangle of n rows */
     hsep_real *c;        /* work: uniform splines, */
-    hsep_real *products;    /* and their products */
+    hsep_real *products; /* and their products */
     slacks slacks;
 } interior_arrays;
 

@@ -74,8 +74,7 @@ HSEP_API void hsep_knots_narrow(const hsep_knots *self, const hsep_real g[], hse
     }
 }
 
-HSEP_API void hsep_knots_add(
-    const hsep_knots *self, const hsep_real products[], hsep_real triangle[], hsep_real work[])
+HSEP_API void hsep_knots_add(const hsep_knots *self, const hsep_real products[], hsep_real triangle[], hsep_real work[])
 {
     memset(work, 0, (size_t)(self->n + 2 * HSEP_KNOTS_NEAR) * sizeof(hsep_real));
     for (hsep_int i = 0; i < self->m; i++) {
