@@ -159,28 +159,29 @@ static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_a
 }
 
 /* Splines, from one on, whose changes of x_h are computed side by side: they have the same distance of knots. */
-static hsep_int averaged_planner_together(
-    const hsep_averaged_planner *self, const hsep_planner *planner, hsep_int first)
+static hsep_int averaged_planner_together(const hsep_planner *planner, hsep_int first)
 {
-    const hsep_int level = hsep_knots_at(&planner->knots, first).level;
-    hsep_int end = first;
-    while (end < self->m && end < first + HSEP_PHYSICS_ABREAST && hsep_knots_at(&planner->knots, end).level == level) {
-        end++;
-    }
-    return end - first;
+    const hsep_int left = hsep_knots_at(&planner->knots, first).last + 1 - first;
+    return left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
+}
+
+/* Whether a spline is the first of its distance of knots. */
+static int averaged_planner_is_first(const hsep_planner *planner, hsep_int i)
+{
+    return i == 0 || hsep_knots_at(&planner->knots, i - 1).last < i;
 }
 
 /* Weighted changes of x_h by the next splines; the first of a distance of knots begins the linearisation. */
 static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    const hsep_int first = self->spline, count = averaged_planner_together(self, task->planner, first);
+    const hsep_int first = self->spline, count = averaged_planner_together(task->planner, first);
     const hsep_int spacing = hsep_planner_splines(task->planner)->spacing;
     const hsep_real *weight = hsep_at(self, self->weight);
     hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
     const hsep_int level = hsep_knots_at(&task->planner->knots, first).level, apart = spacing << level;
     const hsep_int from = averaged_planner_begins(self)[first];
-    if (first == 0 || hsep_knots_at(&task->planner->knots, first - 1).level != level) {
+    if (averaged_planner_is_first(task->planner, first)) {
         const hsep_linearised_change change = averaged_planner_shape(self, task->planner, level);
         hsep_linearised_begin(linearised, task->model, &change);
     }
@@ -381,7 +382,7 @@ static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planne
     /* with what is learned at the end of the last window, as much as commands of a plan */
     work.begun = 3.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
     work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
-    work.linearise = all * HSEP_WORK_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 7.0);
+    work.linearise = all * HSEP_WORK_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 14.0);
     work.factor = work.pairs * (n / 6.0 + 1.5);
     work.solve = 5.0 * HSEP_ORDERS * work.number + 2.0 * work.pairs; /* row, bound, slack, multiplier of each order */
     work.step = (10.0 * HSEP_ORDERS * work.number + work.pairs * (n / 6.0 + 3.0)) / HSEP_INTERIOR_PARTS;
@@ -394,9 +395,18 @@ static hsep_real averaged_planner_of_products(hsep_averaged_planner *self, hsep_
     hsep_real sum = 0.0;
     for (hsep_int i = begin; i < end && i < self->m; i++) {
         const hsep_int length = self->preview - averaged_planner_begins(self)[i];
-        sum += 0.5 * (hsep_real)(self->m - i) * ((hsep_real)length + HSEP_WORK_NUMBER);
+        sum += 0.7 * (hsep_real)(self->m - i) * ((hsep_real)length + HSEP_WORK_NUMBER);
     }
     return sum;
+}
+
+/* Columns from one on, with what begins the linearisation of a distance of knots. */
+static hsep_real averaged_planner_of_columns(
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, hsep_int first)
+{
+    const hsep_linearised *linearised = (const hsep_linearised *)hsep_at_const(self, self->linearised);
+    const hsep_real begun = averaged_planner_is_first(task->planner, first) ? 6.0 * work->number : 0.0;
+    return begun + hsep_linearised_work(linearised, task->model, averaged_planner_begins(self)[first]);
 }
 
 /* Predict the next samples under a plan with variances, one for every apart; without one only count what they take. */
@@ -417,7 +427,6 @@ static hsep_real averaged_planner_vary(
 static hsep_real averaged_planner_left(
     hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work)
 {
-    const hsep_linearised *linearised = (const hsep_linearised *)hsep_at_const(self, self->linearised);
     const hsep_int window = self->late + self->Np, behind = self->preview - self->Np, first = self->samples;
     const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
     hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
@@ -429,7 +438,7 @@ static hsep_real averaged_planner_left(
         left += (hsep_real)(window - first + behind) * work->sample +
                 (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
     }
-    const hsep_real programme = 15.0 * work->number + 4.0 * work->pairs + work->factor + work->solve;
+    const hsep_real programme = 20.0 * work->number + 5.0 * work->pairs + work->factor + work->solve;
     if (self->place == 0 && self->planned) {
         left += programme + (hsep_real)averaged_planner_physics_steps(self) * parts;
     }
@@ -438,9 +447,9 @@ static hsep_real averaged_planner_left(
     }
     if (self->place == 0 && self->follows) {
         hsep_real newton = work->linearise + averaged_planner_of_products(self, 0, self->m) + work->factor +
-                           work->solve + 2.0 * HSEP_AVERAGED_TRIES * work->predict;
-        for (hsep_int i = 0; i < self->m; i += averaged_planner_together(self, task->planner, i)) {
-            newton += hsep_linearised_work(linearised, task->model, averaged_planner_begins(self)[i]);
+                           work->solve + 3.0 * work->predict; /* one length of it is enough nearly always */
+        for (hsep_int i = 0; i < self->m; i += averaged_planner_together(task->planner, i)) {
+            newton += averaged_planner_of_columns(self, task, work, i);
         }
         for (hsep_int i = 0; i < self->n_steps; i++) {
             left += newton + (hsep_real)averaged_planner_steps(self, i) * parts;
@@ -466,7 +475,6 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
     const averaged_planner_work work = averaged_planner_work_of(self, task);
     const hsep_int all = self->late + self->preview;
     hsep_planner *planner = task->planner;
-    hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
     hsep_real *of_physics = hsep_at(self, self->of_physics);
 
@@ -486,7 +494,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            AVERAGED_PLANNER_YIELD(2, 15.0 * work.number + 4.0 * work.pairs);
+            AVERAGED_PLANNER_YIELD(2, 20.0 * work.number + 5.0 * work.pairs);
             averaged_planner_open(self, task);
             AVERAGED_PLANNER_YIELD(4, work.factor);
             self->planned = (hsep_int)hsep_planner_factor(planner);
@@ -544,8 +552,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             AVERAGED_PLANNER_YIELD(7, work.linearise);
             averaged_planner_linearise(self, task);
             for (self->spline = 0; self->spline < self->m;) {
-                AVERAGED_PLANNER_YIELD(
-                    8, hsep_linearised_work(linearised, task->model, averaged_planner_begins(self)[self->spline]));
+                AVERAGED_PLANNER_YIELD(8, averaged_planner_of_columns(self, task, &work, self->spline));
                 averaged_planner_columns(self, task);
             }
             for (self->spline = 0; self->spline < self->m;) {

@@ -433,7 +433,7 @@ HSEP_API hsep_real hsep_linearised_work(const hsep_linearised *self, hsep_averag
         if (linearised_counts(model, linearised_experts[i])) {
             const hsep_real p = (hsep_real)hsep_averaged_expert(model, linearised_experts[i])->p;
             const hsep_real lags = hsep_fmin(p, length); /* of a sample; the first ones have fewer */
-            sum += 0.8 * lags * (length - 0.5 * lags) +
+            sum += 0.85 * lags * (length - 0.5 * lags) +
                    length * (HSEP_WORK_MODE * (hsep_real)physics->n_modes + 16.0 + HSEP_FEATURES_N_STOPS);
         }
     }
