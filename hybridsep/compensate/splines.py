@@ -29,9 +29,6 @@ half plane grow from window to window where the preview is short."""
 _RIDGE = 1e-12
 """Added to the diagonal of a plan's cost, relative to its largest entry: rounding cannot leave it indefinite."""
 
-_TWO_SCALE = (0.125, 0.5, 0.75, 0.5, 0.125)
-"""A cubic B-spline as a sum of those with half its knot interval."""
-
 
 def solved_splines(n: int, window: int) -> Array:
     """Return the splines that a plan of the averaged model is solved for, ``(n, m)``, as sums of ``n`` free ones.
@@ -42,13 +39,14 @@ def solved_splines(n: int, window: int) -> Array:
 
     ``n``: splines that a plan may change; ``window``: splines that begin in a window.
     """
+    two_scale = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 8.0  # a cubic spline by those with half its knot interval
     columns, begin, sums, window = [], 0, np.ones(1), max(window, 4)
     for apart, end in ((1, 2 * window), (2, 4 * window), (4, n)):
         while begin < end and begin + len(sums) <= n:
             columns.append(_padded(np.concatenate((np.zeros(begin), sums)), n))
             begin += apart
         begin -= 4 * apart  # the next ones overlap
-        sums = np.convolve(np.kron(sums, (1.0, 0.0))[: 2 * len(sums) - 1], _TWO_SCALE)
+        sums = np.convolve(np.kron(sums, (1.0, 0.0))[: 2 * len(sums) - 1], two_scale)
     return np.column_stack(columns)
 
 

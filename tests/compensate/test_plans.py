@@ -100,7 +100,7 @@ def test_splines_that_are_solved_for_have_knots_further_apart(n: int, window: in
     assert np.linalg.matrix_rank(splines) == splines.shape[1]
     k = np.arange(basis.preview)
     for one in splines.T:
-        begin, count = int(np.flatnonzero(one)[0]), np.count_nonzero(one)
+        begin, count = int(np.flatnonzero(one)[0]), int(np.count_nonzero(one))
         apart = 2 * {1: 1, 5: 2, 13: 4}[count]  # samples between knots
         spline = BSpline.basis_element(np.arange(5), extrapolate=False)((k - 2 * begin) / apart)
         np.testing.assert_allclose(basis.values[:, N_DECIDED:] @ one, np.nan_to_num(spline), rtol=0, atol=1e-15)

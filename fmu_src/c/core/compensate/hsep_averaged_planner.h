@@ -95,8 +95,7 @@ HSEP_API void hsep_averaged_planner_init(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_real start, hsep_planner *plans, const hsep_real spline[]);
 
-/* The part of it for which columns and products of a Newton step are needed: splines of each distance of knots, and what
- * they give with the physics model alone. */
+/* The last part of that: splines of each distance of knots, and what they give with the physics model alone. */
 HSEP_API void hsep_averaged_planner_shape(hsep_averaged_planner *self, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
@@ -108,11 +107,11 @@ HSEP_API void hsep_averaged_planner_begin(
 
 /* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that may be left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
- * Cost: of a plan at most, with n splines that are not pinned and all = preview + late samples, m^2 / 2 multiply-adds
- * for each expert with m features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 3 steps
- * of the physics model's programme, and 3 Newton steps of n preview p / 2 for each expert, n^2 preview / 4, 2
+ * Cost: of a plan at most, with n splines that are solved for and all = preview + late samples, f^2 / 2 multiply-adds
+ * for each expert with f features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 3 steps
+ * of the physics model's programme, and 3 Newton steps of n preview p / 3 for each expert, n^2 preview / 4, 2
  * predictions, and 5 steps of their programmes; or 5 steps of the first, and of the programme of a plan that ends
- * compensation. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all (m + 60) for each expert, and
+ * compensation. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all (f + 60) for each expert, and
  * 700 all. */
 HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples);
 

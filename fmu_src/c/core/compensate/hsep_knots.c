@@ -1,21 +1,15 @@
 #include "hsep_knots.h"
 
-#include "hsep_plan_constants.h"
 #include "hsep_vector.h"
 
 #include <string.h>
 
 /* Cubic splines with knots 1, 2 and 4 spacings apart as sums of those 1 apart: the two-scale relation, once and twice.
  */
-static const hsep_real knots_one[] = {1.0};
-static const hsep_real knots_two[] = {HSEP_SPLINES_TWO_SCALE};
-static const hsep_real knots_four[] = {1.0 / 64.0,  4.0 / 64.0,  10.0 / 64.0, 20.0 / 64.0, 31.0 / 64.0,
-                                       40.0 / 64.0, 44.0 / 64.0, 40.0 / 64.0, 31.0 / 64.0, 20.0 / 64.0,
-                                       10.0 / 64.0, 4.0 / 64.0,  1.0 / 64.0};
-static const hsep_knot knots_levels[HSEP_KNOTS_LEVELS] = {
-    {.level = 0, .length = 1, .share = knots_one},
-    {.level = 1, .length = 5, .share = knots_two},
-    {.level = 2, .length = 13, .share = knots_four}};
+static const hsep_real knots_shares[] = {1.0,      0.125,   0.5,     0.75,     0.5,     0.125,  0.015625,
+                                         0.0625,   0.15625, 0.3125,  0.484375, 0.625,   0.6875, 0.625,
+                                         0.484375, 0.3125,  0.15625, 0.0625,   0.015625};
+static const hsep_int knots_lengths[HSEP_KNOTS_LEVELS] = {1, 5, 13}, knots_places[HSEP_KNOTS_LEVELS] = {0, 1, 6};
 
 HSEP_API hsep_knots hsep_knots_of(hsep_int n, hsep_int window)
 {
@@ -25,7 +19,7 @@ HSEP_API hsep_knots hsep_knots_of(hsep_int n, hsep_int window)
     for (int level = 0; window > 0 && level < HSEP_KNOTS_LEVELS; level++) {
         const hsep_int apart = (hsep_int)1 << level, end = level < HSEP_KNOTS_LEVELS - 1 ? 2 * apart * wide : n;
         knots.begin[level] = begin;
-        for (; begin < end && begin + knots_levels[level].length <= n; begin += apart) {}
+        for (; begin < end && begin + knots_lengths[level] <= n; begin += apart) {}
         knots.count[level] = (begin - knots.begin[level]) / apart;
         begin -= 4 * apart; /* the next ones overlap */
     }
@@ -45,10 +39,12 @@ HSEP_API hsep_knot hsep_knots_at(const hsep_knots *self, hsep_int i)
     while (i >= end) {
         end += self->count[++level];
     }
-    hsep_knot knot = knots_levels[level];
-    knot.last = end - 1;
-    knot.begin = self->begin[level] + ((i + self->count[level] - end) << level);
-    return knot;
+    return (hsep_knot){
+        .level = (hsep_int)level,
+        .last = end - 1,
+        .begin = self->begin[level] + ((i + self->count[level] - end) << level),
+        .length = knots_lengths[level],
+        .share = knots_shares + knots_places[level]};
 }
 
 HSEP_API void hsep_knots_widen(const hsep_knots *self, const hsep_real x[], hsep_real c[])

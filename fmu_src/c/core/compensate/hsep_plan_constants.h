@@ -8,7 +8,6 @@
 #define HSEP_SPLINES_END 3
 #define HSEP_SPLINES_LEAST 0.1
 #define HSEP_SPLINES_RIDGE 1e-12
-#define HSEP_SPLINES_TWO_SCALE 0.125, 0.5, 0.75, 0.5, 0.125
 
 /* hybridsep/compensate/qp.py */
 #define HSEP_QP_FIRST_SLACK 0.3

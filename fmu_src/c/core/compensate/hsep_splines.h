@@ -82,8 +82,8 @@ HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self);
  * each shifted by one spacing more. Each diagonal is a running sum: n preview / 2 multiply-adds. */
 HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[]);
 
-/* The products weight D' D, and g, (n - first,), := -weight D' third, with the third differences D of the splines first ...
- * n - 1, m; third: (preview,) m. */
+/* The products weight D' D, and g, (n - first,), := -weight D' third, with the third differences D of the splines
+ * first ... n - 1, m; third: (preview,) m. */
 HSEP_API void hsep_splines_jerk(
     const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real products[],
     hsep_real g[]);
