@@ -311,7 +311,7 @@ class Stretch:
     """
 
     machine: Machine
-    # (n,), m: commands, which begin at rest, and the model's response to them
+    # (n,), m: commands, from rest at 0 to rest, and the model's response to them
     x_d: Array
     x: Array
     judged: slice  # samples that are judged
@@ -321,7 +321,7 @@ class Stretch:
         """Return the stretch where the model alone errs most; None where it has no error to compensate."""
         model, known = machine.model, machine.compensator_predictor
         discrete, n = model.discretise(known.T_s, known.input_hold), min(_DEMANDING, 5 * machine.look_ahead)
-        most, lead, x_d = 0.0, n // 4, np.empty(0)
+        most, lead, steps = 0.0, n // 4, np.empty(0)
 
         def response(x_d: Array) -> Array:
             return np.asarray(discrete.forced_response(discrete.rest(), x_d - x_d[0])[0] + x_d[0])
@@ -331,11 +331,17 @@ class Stretch:
             parts = sums[n:] - sums[:-n] if len(sums) > n else sums[-1:]
             first = int(np.argmax(parts))
             if parts[first] > most:
-                # a drive at rest and a plan without any change begin it, which takes as long as a step's response
-                most, x_d = float(parts[first]), np.pad(one.x_d, (lead, 0), mode="edge")[first : first + lead + n]
+                most, steps = float(parts[first]), np.pad(np.diff(one.x_d), lead, mode="edge")
+                steps = steps[first : first + 2 * lead + n - 1]
         if not most:
             return None
-        found = cls(machine, x_d, response(x_d), slice(lead, None))
+        # The log moves where it is cut: on both sides, for as long as a step's response, its velocity is led from rest
+        # and to it
+        ramp = np.sin(0.5 * np.pi * np.arange(lead) / lead) ** 2
+        steps[:lead] *= ramp
+        steps[-lead:] *= ramp[::-1]
+        x_d = np.concatenate(([0.0], np.cumsum(steps)))
+        found = cls(machine, x_d, response(x_d), slice(lead, -lead))
         return found if found.off > _LITTLE * largest_motion(recordings, known.T_s)[1] else None
 
     @property
@@ -353,23 +359,27 @@ class Stretch:
     def limit_costs(self) -> LimitCosts:
         """Return what each limit of the machine's drive costs.
 
-        A limit twice as large is advised where that takes away a part of the error, and all of them together do.
+        A limit twice as large is advised where that takes away a part of the error, and all of them together do, in RMS
+        and without a larger largest error.
         """
         own, Np = self.machine.compensator_settings, self.machine.compensator_predictor.Np
+        least = _LITTLE * self.off
 
         def error_of(settings: CompensatorSettings) -> ErrorSize:
             return ErrorSize.of(self.expected(settings, Np).compensated)
+
+        def gains(error: ErrorSize) -> bool:
+            return max(error.rms, least) < (1.0 - _GAIN) * now.rms and error.largest <= now.largest
 
         now, wanted, effects, advised = error_of(own), own, {}, {}
         for entry in _CHANGED[: 2 if own.change_max is None else 3]:
             name = DRIVE_LIMIT_ENTRIES[entry].name
             effects[name] = {one: now if one == 1.0 else error_of(_scaled(own, entry, one)) for one in FACTORS}
-            if effects[name][2.0].rms < (1.0 - _GAIN) * now.rms:
+            if gains(effects[name][2.0]):
                 wanted = _scaled(wanted, entry, 2.0)
                 advised[name] = float(wanted.to_fmi()[name])
         advised_error = error_of(wanted) if advised else now
-        gains = advised_error.rms < (1.0 - _GAIN) * now.rms
-        return LimitCosts(effects, advised if gains else {}, advised_error)
+        return LimitCosts(effects, advised if gains(advised_error) else {}, advised_error)
 
     def look_aheads(self) -> LookAheads:
         """Return what plans leave with some look-aheads."""

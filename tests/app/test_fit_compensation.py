@@ -178,15 +178,19 @@ def test_all_three_limits_are_needed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("sizes", "advised"),
+    ("sizes", "off", "advised"),
     [
-        ({"change_max": {0.5: 1.0, 1.0: 1.0, 2.0: 1.0}}, []),  # half of it costs nothing, and gains nothing
-        ({"change_max": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}}, ["change_max"]),
-        ({"acceleration": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}, "change_max": {0.5: 3.0, 1.0: 1.0, 2.0: 0.9}}, []),
+        ({"change_max": {0.5: 1.0, 1.0: 1.0, 2.0: 1.0}}, 9.0, []),  # half of it costs nothing, and gains nothing
+        ({"change_max": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}}, 9.0, ["change_max"]),
+        ({"change_max": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}}, 200.0, []),  # little is left of the error today
+        ({"change_max": {0.5: 2.0, 1.0: 1.0, 2.0: [0.5, 1.1]}}, 9.0, []),  # the largest error rises
+        ({"acceleration": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}, "change_max": {0.5: 3.0, 1.0: 1.0, 2.0: 0.9}}, 9.0, []),
     ],
 )
-def test_what_is_advised_gains_something(sizes: dict[str, dict[float, float]], advised: list[str]) -> None:
-    """Alone and together: in the last case both leave as much as today."""
+def test_what_is_advised_gains_something(
+    sizes: dict[str, dict[float, float | list[float]]], off: float, advised: list[str]
+) -> None:
+    """Alone and together: in the last case both leave as much as today. ``off`` is the error without compensation."""
     limits = {"velocity": 0.1, "acceleration": 1.0, "jerk": 10.0, "change_max": 1e-3}
     x_d = command()[:200]
 
@@ -197,6 +201,6 @@ def test_what_is_advised_gains_something(sizes: dict[str, dict[float, float]], a
             factors = {"acceleration": settings.limits.acceleration, "change_max": settings.change_max / 1e-3}
             changed = [(name, factor) for name, factor in factors.items() if factor != 1.0]
             size = sizes.get(changed[0][0], {}).get(changed[0][1], 1.0) if len(changed) == 1 else 1.0
-            return Expected(x_d, np.full(Np, size), x_d, x_d)
+            return Expected(x_d, np.resize(size, Np), x_d, x_d)
 
-    assert list(Drawn(axis(limits), x_d, x_d, slice(None)).limit_costs().advised) == advised
+    assert list(Drawn(axis(limits), x_d, x_d - off, slice(None)).limit_costs().advised) == advised
