@@ -125,7 +125,9 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     change_max = 0.3 * float(np.abs(x_d - x).max())
     machine = axis({"velocity": 0.3, "acceleration": 30.0, "jerk": 2e4, "change_max": change_max})
     found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None)
-    found = replace(found, largest=1.5 * change_max, fastest=0.5)
+    found = replace(
+        found, largest=1.5 * change_max, motion={"v_max": (0.5, 0.3), "a_max": (30.0, 30.0), "j_max": (2.5e4, 2e4)}
+    )
     assert found.limits["hybrid"]["change_max"] > 0.1
     assert found.costs is not None
     assert list(found.costs.effects) == ["a_max", "j_max", "change_max"]
@@ -141,6 +143,8 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     beyond = f"{0.5e6 * change_max:.4g} µm of it cannot be compensated."
     assert f"The largest servo error of the log, {1.5e6 * change_max:.4g} µm, is above change_max: {beyond}" in said
     assert "The log's commands reach 500 mm/s, above v_max = 300 mm/s: where they do, it bounds" in said
+    assert "The log's commands reach 2.5e+07 mm/s³, above j_max = 2e+07 mm/s³: where they do, it bounds" in said
+    assert "above a_max" not in said
     assert "set change_max to twice that error; motion" in said
     assert "following_error_max is 0: nothing trips." in said
 
