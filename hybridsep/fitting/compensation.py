@@ -377,8 +377,7 @@ class Stretch:
     def limit_costs(self) -> LimitCosts:
         """Return what each limit of the machine's drive costs.
 
-        A limit twice as large is advised where that takes away a part of the error, and all of them together do, in RMS
-        and without a larger largest error.
+        One twice as large is advised where RMS falls and the largest error does not rise, also with all together.
         """
         own, Np = self.machine.compensator_settings, self.machine.compensator_predictor.Np
         least = _LITTLE * self.off
