@@ -212,7 +212,7 @@ def _learned(machine: Machine, recipe: Recipe, x: Array, path: Path) -> Path:
     """Save what ``fit`` would teach a compensator of a run without compensation, ``(n,)``, m."""
     quantum, x_d = recipe.encoder.quantum, trajectory(recipe)
     run = Recording(x_d, quantum * np.round((x + recipe.noise[: len(x)]) / quantum), len(x))
-    taught(machine, [run], largest(np.diff(x_d)) / machine.T_s).save(path)
+    taught(machine, [run]).save(path)
     return path
 
 

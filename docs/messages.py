@@ -144,8 +144,11 @@ FINDINGS: Mapping[str, Explanation] = {
         "the controller gets the measurement as late, `--measurement_delay`.",
     ),
     "offset": Explanation(
-        "The zeros of the two positions differ by more than the error varies.",
-        "None is needed: the offset is learned.",
+        "The two positions differ by more than the error varies: they count from different zeros, or the axis stands "
+        "beside its command, as under gravity in a position loop without an integrator. The columns do not tell which.",
+        "A prediction needs none: the offset is learned. A compensator moves the axis by it. That is right where the "
+        "axis stands beside its command. Where only the zeros differ, take the offset away from the measured column, "
+        "and from what the compensator measures, before it moves the axis.",
     ),
     "start in motion": Explanation(
         "The axis moves when the log begins; the physics model starts from rest.",

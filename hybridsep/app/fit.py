@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..base.errors import ParameterError
-from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, Limits
+from ..base.settings import PARAMETERS, Cascade, Limits
 from . import options
 
 if TYPE_CHECKING:
@@ -183,11 +183,15 @@ def _next_steps(found: "Fit", files: Mapping[str, Path]) -> list[str]:
     if found.machine.plant is None:
         lines.append(f"  # no plant to try with: {found.plant.reason}")
     else:
-        # What was learned of the axis helps on a plant that has its disturbances, and on no other.
-        warm = f" --weights {state}" if found.plant.disturbed else ""
-        how = f" --compensate hybrid{warm}" if limits is not None else ""
-        what = "the compensated axis" if limits is not None else "prediction"
-        lines.append(f"  # {what}, on the identified model: to try with, results are optimistic")
+        what, how = "prediction, on the identified model", ""
+        if limits is not None:
+            # What was learned of the axis helps on a plant that has its disturbances and its offset, and on no other.
+            noted = {one.name for of_log in found.findings.values() for one in of_log}
+            lacks = "friction and stiffness" if not found.plant.disturbed else "offset" if "offset" in noted else ""
+            cold = f", without the log's {lacks} and so without --weights" if lacks else ""
+            what, how = f"the compensated axis, on the identified model{cold}", " --compensate hybrid"
+            how += "" if lacks else f" --weights {state}"
+        lines.append(f"  # {what}: to try with, results are optimistic")
         lines += [f"  hybridsep cosim -m {file} --compensate off"] if limits is not None else []
         lines += [
             f"  hybridsep cosim -m {file}{how}",
@@ -195,14 +199,13 @@ def _next_steps(found: "Fit", files: Mapping[str, Path]) -> list[str]:
             f"  hybridsep system -m {file}{how}",
         ]
     if limits is not None and limits.estimated:
-        names = [(one.name, getattr(limits, entry)) for entry, one in DRIVE_LIMIT_ENTRIES.items()]
-        known = [f"--{name} {value:g}" for name, value in names[: len(Limits.parameters())]]
+        names = [(one.name, getattr(limits, entry)) for entry, one in Limits.parameters().items()]
+        known = [f"--{name} {value:g}" for name, value in names]
         unit = found.machine.unit
         rates = f"in {unit}/s, {unit}/s² and {unit}/s³"
         factor, own = found.judged.shown.position
-        here = [
-            f"{factor * value:.4g} {own}/s{power}" for (_, value), power in zip(names, ("", "²", "³"), strict=False)
-        ]
+        powers = zip(names, ("", "²", "³"), strict=True)
+        here = [f"{factor * value:.4g} {own}/s{power}" for (_, value), power in powers]
         lines.append(f"  # a compensator FMU for the drive; the limits are estimates: put in your drive's, {rates}")
         lines += [f"  # (these are {', '.join(here)})"] if own != unit else []
         lines.append(f"  hybridsep {shlex.join(sys.argv[1:])} {' '.join(known)}")

@@ -88,8 +88,9 @@ def backtest(
         replayed = replay(predictor, recordings, lambda done: advance("replay", 0.8 * done))
         replayed = replayed.with_peers(lambda done: advance("ARX models", 0.8 + 0.2 * done))
     known = weights is not None and knew(HybridPredictor.load(weights), predictor)
-    scores, words = replayed.backtest, whole_log_words(warm=weights is not None, known=known)
-    judged = Judged(replayed, read.T_s, shown, "the whole log", known=known, controller=controller_of([read]))
+    warm, controller = weights is not None, controller_of([read])
+    scores, words = replayed.backtest, whole_log_words(warm=warm, known=known)
+    judged = Judged(replayed, read.T_s, shown, "the whole log", known=known, warm=warm, controller=controller)
     settings = predictor.settings
     run = replayed_run(*(scores, read.x_d, read.x_meas, read.T_s, settings.Np), measurement_delay=settings.n_late)
     for path in saved:

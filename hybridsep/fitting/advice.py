@@ -39,6 +39,7 @@ class Judged:
     period: str = ""
     unidentified: bool = False  # whether the log's first half had too little motion to identify the axis from
     known: bool = False  # whether the predictor had been trained with the log
+    warm: bool = False  # whether it had been trained with another, which no peer had
     # what the controller says of itself; None where the logs have none of its signals
     controller: Controller | None = None
 
@@ -99,7 +100,7 @@ def advice_on(judged: Judged) -> str:
     peer = _IN_WORDS.get(best.name, best.name)
     if best.rms < judged.replay.least:
         return f"There is nothing to gain in {judged.part}: the log's resolution does not show the error of {peer}."
-    ratio = hybrid.rms / best.rms
+    ratio, the = hybrid.rms / best.rms, "the hybrid (which alone began trained)" if judged.warm else "the hybrid"
     if n < WINDOWS_ENOUGH or judged.unidentified:
         how = "better than" if ratio < 1.0 - ALIKE else "worse than" if ratio > 1.0 + ALIKE else "as good as"
         but = f"but judged by {counted(n)} only: {_enough(judged)}"
@@ -108,21 +109,21 @@ def advice_on(judged: Judged) -> str:
                 "but the first half has too little motion to learn the axis from, for the physics model and for the "
                 "others: record moves in both halves"
             )
-        return f"So far the hybrid is {how} {peer}, {ratio:.2f} × its error, {but}."
+        return f"So far {the} is {how} {peer}, {ratio:.2f} × its error, {but}."
     by = f"judged by {counted(n)}"
     if ratio < 1.0 - ALIKE:
-        return f"Use the hybrid: its error is {ratio:.2f} × the error of {peer}, the best of the others, {by}."
+        return f"Use {the}: its error is {ratio:.2f} × the error of {peer}, the best of the others, {by}."
     if ratio <= 1.0 + ALIKE:
-        return f"The hybrid is neither better nor worse here: {ratio:.2f} × the error of {peer}, {by}."
+        return f"{the.capitalize()} is neither better nor worse here: {ratio:.2f} × the error of {peer}, {by}."
     plain = min(others[:2], key=lambda one: one.rms)  # physics model and hold, which need no other model
     against = hybrid.rms / plain.rms
     if best.name == plain.name or against >= 1.0 - ALIKE:
         return (
-            f"Do not use the hybrid on what this log shows: {ratio:.2f} × the error of {peer}, which is best, {by}"
+            f"Do not use {the} on what this log shows: {ratio:.2f} × the error of {peer}, which is best, {by}"
             f"{_more_motion(judged)}.{_what_would_help(judged)}"
         )
     return (
-        f"Best on what this log shows is {peer}: the hybrid has {ratio:.2f} × its error, {against:.2f} × the error of "
+        f"Best on what this log shows is {peer}: {the} has {ratio:.2f} × its error, {against:.2f} × the error of "
         f"{_IN_WORDS[plain.name]}, {by}{_more_motion(judged)}.{_what_would_help(judged)}"
     )
 

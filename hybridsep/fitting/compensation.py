@@ -8,13 +8,14 @@ from typing import Any, cast
 import numpy as np
 
 from ..base.errors import ParameterError, SignalError
-from ..base.metrics import ErrorSize, peak_derivatives, rms
+from ..base.metrics import ErrorSize, largest, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, CompensatorSettings, Limits
 from ..base.signals import Array
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
 from ..compensate.planning import FASTER
 from ..cosim.inverse import FirInverse
 from ..identify.output_error import in_time
+from ..logs.checks import resolution
 from ..logs.units import DisplayUnits
 from ..machines.machine import Machine
 from ..predict.averaging.model import AveragedModel
@@ -24,6 +25,10 @@ from .replay import Recording, beginnings, replay
 MARGINS = np.array([1.25, 2.0, 5.0])
 """Limits of velocity, acceleration and jerk relative to a log's largest, as in the machine files that come with the
 library."""
+
+_ROUNDING = 0.1  # most that rounding may have of the largest difference of commands, from which motion is estimated
+_OVER = tuple(sorted({round(1.25**i) for i in range(40)}))  # samples that such a difference may be over
+_HELD, _STEPS = 0.1, 100  # quantile of the intervals between changes for which a command is held; fewer are steps
 
 _FOLLOWING_ERROR = 1.3
 """``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
@@ -73,11 +78,30 @@ def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
     return found
 
 
+def _motion(x_d: Array, T_s: float) -> list[float]:
+    """Return the largest velocity, acceleration and jerk of commands, ``(n,)``, without what holds and rounds them.
+
+    Differences are over as many samples as a command is held for, and as make its rounding small against them.
+    """
+    intervals = np.diff(np.flatnonzero(np.diff(x_d)))
+    held = int(np.quantile(intervals, _HELD)) if len(intervals) > _STEPS else 1
+    x_d, T_s = x_d[::held], held * T_s
+    # Rounding is white noise where the command moves, but not at every speed, and no more than its smallest change
+    rough = np.abs(np.diff(x_d, 5))[x_d[5:] != x_d[:-5]]
+    noise = float(np.quantile(rough, 0.9)) / (1.645 * math.sqrt(252.0)) if len(rough) else 0.0
+    rounding = min(resolution(x_d), math.sqrt(12.0) * noise)
+    found = []
+    for order in (1, 2, 3):
+        sizes = {n: largest(np.diff(x_d[: len(x_d) // n * n].reshape(-1, n), order, axis=0)) for n in _OVER}
+        n = next((n for n, size in sizes.items() if 2 ** (order - 1) * rounding <= _ROUNDING * size), 1)
+        found.append(sizes[n] / (n * T_s) ** order)
+    return found
+
+
 def largest_motion(recordings: Sequence[Recording], T_s: float) -> tuple[Array, float]:
     """Return the largest velocity, acceleration and jerk of the commands, ``(3,)``, and the largest servo error, m."""
-    long = [one for one in recordings if len(one.x_d) > 3]
-    peaks = np.array([peak_derivatives(one.x_d, T_s) for one in long]).reshape(-1, 3).max(axis=0, initial=0.0)
-    return peaks, max((float(np.nanmax(np.abs(one.x_d - one.x), initial=0.0)) for one in long), default=0.0)
+    peaks = np.array([_motion(one.x_d, T_s) for one in recordings]).reshape(-1, 3).max(axis=0, initial=0.0)
+    return peaks, max((float(np.nanmax(np.abs(one.x_d - one.x), initial=0.0)) for one in recordings), default=0.0)
 
 
 def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, Any]:
@@ -123,11 +147,9 @@ class LimitCosts:
         return lines
 
 
-def taught(machine: Machine, recordings: Sequence[Recording], fastest: float) -> HybridPredictor:
-    """Return a predictor that has learned recordings for a compensator, whose plans turn where no log has turned.
-
-    ``fastest``, m/s, is the largest velocity of their commands.
-    """
+def taught(machine: Machine, recordings: Sequence[Recording]) -> HybridPredictor:
+    """Return a predictor that has learned recordings for a compensator, whose plans turn where no log has turned."""
+    (fastest, *_), _ = largest_motion(recordings, machine.T_s)
     predictor = HybridPredictor(machine.model, machine.predictor_settings)
     residual = cast(AveragedModel, predictor.residual)
     learned = replace(residual.learned, velocity_scale=_SCALE * fastest)
@@ -209,10 +231,8 @@ class Tracking:
     change_max: float | None
     following_error_max: float
     duration: float  # of the samples that are tried, of a long log from its beginning, s
-    # largest servo error of the whole logs, m, and largest velocity of their commands, m/s
-    largest: float
-    fastest: float
-    v_max: float  # the drive's, m/s
+    largest: float  # servo error of the whole logs, m
+    motion: Mapping[str, Sequence[float]]  # name of a limit → largest of the logs' commands, and the drive's, SI
     look_aheads: LookAheads | None  # None where the model has no error to compensate
 
     def lines(self, shown: DisplayUnits) -> list[str]:
@@ -241,13 +261,14 @@ class Tracking:
                 f"The largest servo error of the log, {shown.words(self.largest, '.4g')}, is above change_max: "
                 f"{left} of it cannot be compensated."
             )
-        if self.v_max < float(f"{self.fastest:.4g}"):  # as it is shown
-            factor, unit = shown.position
-            lines.append(
-                f"The log's commands reach {factor * self.fastest:.4g} {unit}/s, above v_max = "
-                f"{factor * self.v_max:.4g} {unit}/s: where they do, it bounds what the compensator adds; is it the "
-                "drive's?"
-            )
+        factor, unit = shown.position
+        for power, (name, sizes) in zip(("", "²", "³"), self.motion.items(), strict=False):
+            reached, most = (float(f"{factor * size:.4g}") for size in sizes)  # as they are shown
+            if most < reached:
+                lines.append(
+                    f"The log's commands reach {reached:.4g} {unit}/s{power}, above {name} = {most:.4g} "
+                    f"{unit}/s{power}: where they do, it bounds what the compensator adds; is it the drive's?"
+                )
         return [
             *lines,
             *(self.costs.lines(shown) if self.costs is not None else ()),
@@ -286,20 +307,21 @@ def expected_tracking(
     bound = {
         model: limits_that_bind(one.x_d, one.x_dm, machine.compensator_predictor.T_s, allowed)
         for model, one in judged.items()
-        if one is not None and len(one.x_d)
+        if len(one.x_d)
     }
     stretch = Stretch.of(machine, recordings)
     costs = stretch.limit_costs() if stretch and bound.get("hybrid") else None
     ahead = stretch.look_aheads() if stretch else None
     progress(1.0)
-    without = next((one.without for one in judged.values() if one is not None), np.empty(0))
-    none, physics, hybrid = ErrorSize.of(without), *map(_size, judged.values())
+    without = max((one.without for one in judged.values()), key=len)
+    none, physics, hybrid = map(ErrorSize.of, (without, *(one.compensated for one in judged.values())))
     inverse, limits = _inverted(machine, first), (allowed.change_max, allowed.following_error_max)
-    (fastest, *_), largest = largest_motion(recordings, machine.T_s)
-    v_max = math.inf if allowed.limits is None else allowed.limits.velocity
+    motion, error = largest_motion(recordings, machine.T_s)
+    drive = {} if allowed.limits is None else allowed.limits.to_fmi()
+    reached = {name: (size, most) for size, (name, most) in zip(motion.tolist(), drive.items(), strict=False)}
     return Tracking(
         *(none, physics, hybrid, inverse, bound, costs, *limits, len(without) * machine.T_s),
-        *(largest, fastest, v_max, ahead),
+        *(error, reached, ahead),
     )
 
 
@@ -311,7 +333,7 @@ class Stretch:
     """
 
     machine: Machine
-    # (n,), m: commands, which begin at rest, and the model's response to them
+    # (n,), m: commands, from rest at 0 to rest, and the model's response to them
     x_d: Array
     x: Array
     judged: slice  # samples that are judged
@@ -321,21 +343,23 @@ class Stretch:
         """Return the stretch where the model alone errs most; None where it has no error to compensate."""
         model, known = machine.model, machine.compensator_predictor
         discrete, n = model.discretise(known.T_s, known.input_hold), min(_DEMANDING, 5 * machine.look_ahead)
-        most, lead, x_d = 0.0, n // 4, np.empty(0)
-
-        def response(x_d: Array) -> Array:
-            return np.asarray(discrete.forced_response(discrete.rest(), x_d - x_d[0])[0] + x_d[0])
-
+        most, lead, steps = 0.0, n // 4, np.empty(0)
         for one in recordings:
-            sums = np.cumsum(np.concatenate(([0.0], (one.x_d - response(one.x_d)) ** 2)))
+            x_d = one.x_d - one.x_d[0]
+            errors = x_d - discrete.forced_response(discrete.rest(), x_d)[0]
+            sums = np.cumsum(np.concatenate(([0.0], errors**2)))
             parts = sums[n:] - sums[:-n] if len(sums) > n else sums[-1:]
             first = int(np.argmax(parts))
             if parts[first] > most:
-                # a drive at rest and a plan without any change begin it, which takes as long as a step's response
-                most, x_d = float(parts[first]), np.pad(one.x_d, (lead, 0), mode="edge")[first : first + lead + n]
+                most, steps = float(parts[first]), np.pad(np.diff(x_d), (lead + 1, lead), mode="edge")
+                steps = steps[first : first + n + 2 * lead]
         if not most:
             return None
-        found = cls(machine, x_d, response(x_d), slice(lead, None))
+        # The log moves where it is cut: on both sides, for as long as a step's response, its velocity is led from rest
+        # and to it
+        k = np.arange(len(steps))
+        x_d = np.cumsum(np.sin(0.5 * np.pi * np.minimum(np.minimum(k, k[::-1]) / lead, 1.0)) ** 2 * steps)
+        found = cls(machine, x_d, discrete.forced_response(discrete.rest(), x_d)[0], slice(lead, -lead))
         return found if found.off > _LITTLE * largest_motion(recordings, known.T_s)[1] else None
 
     @property
@@ -353,23 +377,26 @@ class Stretch:
     def limit_costs(self) -> LimitCosts:
         """Return what each limit of the machine's drive costs.
 
-        A limit twice as large is advised where that takes away a part of the error, and all of them together do.
+        One twice as large is advised where RMS falls and the largest error does not rise, also with all together.
         """
         own, Np = self.machine.compensator_settings, self.machine.compensator_predictor.Np
+        least = _LITTLE * self.off
 
         def error_of(settings: CompensatorSettings) -> ErrorSize:
             return ErrorSize.of(self.expected(settings, Np).compensated)
+
+        def gains(error: ErrorSize) -> bool:
+            return max(error.rms, least) < (1.0 - _GAIN) * now.rms and error.largest <= now.largest
 
         now, wanted, effects, advised = error_of(own), own, {}, {}
         for entry in _CHANGED[: 2 if own.change_max is None else 3]:
             name = DRIVE_LIMIT_ENTRIES[entry].name
             effects[name] = {one: now if one == 1.0 else error_of(_scaled(own, entry, one)) for one in FACTORS}
-            if effects[name][2.0].rms < (1.0 - _GAIN) * now.rms:
+            if gains(effects[name][2.0]):
                 wanted = _scaled(wanted, entry, 2.0)
                 advised[name] = float(wanted.to_fmi()[name])
         advised_error = error_of(wanted) if advised else now
-        gains = advised_error.rms < (1.0 - _GAIN) * now.rms
-        return LimitCosts(effects, advised if gains else {}, advised_error)
+        return LimitCosts(effects, advised if gains(advised_error) else {}, advised_error)
 
     def look_aheads(self) -> LookAheads:
         """Return what plans leave with some look-aheads."""
@@ -387,14 +414,14 @@ class Stretch:
         return LookAheads(tuple(tried), chosen, self.off, len(found.x_d) * known.T_s, known.T_s)
 
 
-def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected | None:
-    """Return the errors to be expected over the test samples, one log after the other; None where a plan diverges."""
+def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected:
+    """Return the errors to be expected over the test samples, one log after the other; empty where a plan diverges."""
     settings, Np = machine.compensator_predictor, machine.compensator_predictor.Np
     firsts = [one.first_judged(Np) for one in recordings if len(one.x) > settings.n_late]
     try:
         found = list(expected_errors(machine.model, settings, compensator, [(one.x_d, one.x) for one in recordings]))
     except SignalError:
-        return None
+        return Expected(*[np.empty(0)] * 4)
     parts = [Expected(*(signal[first:] for signal in one)) for one, first in zip(found, firsts, strict=True)]
     return Expected(*map(np.concatenate, zip(*parts, strict=True)))
 
@@ -411,10 +438,6 @@ def _inverted(machine: Machine, recordings: Sequence[Recording]) -> ErrorSize:
             change = rival.command(x_d) - x_d
             errors.append((x_d - x - discrete.forced_response(discrete.rest(), change)[0])[one.first_judged(Np) :])
     return ErrorSize.of(np.concatenate(errors) if errors else np.empty(0))
-
-
-def _size(found: Expected | None) -> ErrorSize:
-    return ErrorSize.of(np.empty(0) if found is None else found.compensated)
 
 
 def _scaled(settings: CompensatorSettings, entry: str, factor: float) -> CompensatorSettings:

@@ -34,14 +34,7 @@ from ..predict.window import Prediction
 from .advice import Judged, advice_on
 from .build import fit_files, sha256_of, write_commands
 from .choice import Tried, choose_settings, period_finding, settings_to_try, with_window
-from .compensation import (
-    LIMITS_WORDS,
-    Tracking,
-    drive_limits,
-    estimated_limits,
-    expected_tracking,
-    taught,
-)
+from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking, taught
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
 from .report import (
@@ -389,7 +382,7 @@ def fit(
     tracking = None
     if given_limits:
         tracking = expected_tracking(machine, recordings, stage("tracking error with compensation", 0.95, 1.0))
-        predictor = taught(machine, recordings, tracking.fastest)
+        predictor = taught(machine, recordings)
     judged = Judged(
         *(replayed, T_s, shown, "the log's second half"),
         share=1.0 - _SHARE,

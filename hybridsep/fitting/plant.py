@@ -161,18 +161,17 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
         return []
     n = 4 * len(alone.model.modes)
 
-    def plant(theta: Array) -> _Disturbed:
+    def plant(theta: Array, with_stiffness: bool) -> _Disturbed:
         modes = [_moved(mode, *theta[4 * i : 4 * i + 4].tolist()) for i, mode in enumerate(alone.model.modes)]
         f, kappa, spread = theta[n:].tolist()
         moved = ModalModel(modes, alone.model.dead_time)
-        return _Disturbed(moved, scale * f, scale * kappa / reach**2, fastest * math.exp(spread))
+        return _Disturbed(moved, scale * f, with_stiffness * scale * kappa / reach**2, fastest * math.exp(spread))
 
     found = []
     for with_stiffness in (False, True):
 
-        def residual(theta: Array, most: float = 1.0 if with_stiffness else 0.0) -> Array:
-            one = plant(theta)
-            one = one._replace(kappa=most * one.kappa)
+        def residual(theta: Array, with_stiffness: bool = with_stiffness) -> Array:
+            one = plant(theta, with_stiffness)
             discrete = one.model.discretise(settings.T_s, settings.input_hold)
             errors = [piece.error(discrete, one)[piece.fitted] for piece in fitted]
             return np.concatenate([(error - error.mean()) / scale for error in errors])
@@ -184,8 +183,7 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
         steps = np.concatenate((np.tile(_MODE_STEPS, modes), np.ones(3)))
         try:
             done = least_squares(residual, start, bounds=(least, bound), x_scale=steps, max_nfev=_EVALUATIONS)
-            one = plant(done.x)
-            one = one if with_stiffness else one._replace(kappa=0.0)
+            one = plant(done.x, with_stiffness)
             StageDrive(one.model, one.f, one.kappa, settings.T_s, v_friction=one.v_friction)
         except (ParameterError, ValueError):  # a mode out of range, or an error that overflowed
             continue

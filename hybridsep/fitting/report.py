@@ -192,20 +192,16 @@ def _write_time(report: Report, judged: Judged) -> None:
     factor, position = judged.shown.position
     lines = [Line("command", t, factor * replay.commands(), _COMMAND)]
     within = coverage(errors[2], std, 0.95)
-    for name, row, colour in zip(_NAMES, errors, _COLOURS, strict=True):
-        if name != _NAMES[1]:
-            lines.append(Line(name, t, row, colour, panel=1))
+    lines += [Line(_NAMES[i], t, errors[i], _COLOURS[i], panel=1) for i in (0, 2)]
     half = np.minimum(1.96 * std, 1.2 * np.nanmax(np.abs(errors)))  # at first it may be far wider than any error
     lines.append(Line("95 % interval of the hybrid", t, -half, HYBRID, upper=half, panel=1))
-    chart = Chart(
-        f"time in {judged.part} [s]",
-        (f"command [{position}]", f"error x − x̂ [{unit}]"),
-        lines,
+    how = (
         f"The hybrid states its own standard deviation with each window; {100 * within:.0f} % of the errors are within "
-        "its 95 % interval.",
+        "its 95 % interval."
     )
+    panels = (f"command [{position}]", f"error x − x̂ [{unit}]")
     report.heading("Errors over time")
-    report.chart(chart)
+    report.chart(Chart(f"time in {judged.part} [s]", panels, lines, how))
 
 
 def _write_horizon(report: Report, judged: Judged) -> None:

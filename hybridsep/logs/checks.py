@@ -45,9 +45,7 @@ _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 _START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
 _LATE = 0.1  # lag, s, from which it is noted: the look-ahead of a controller of which nothing is known
 
-_ALONE, _SIZE = 10.0, 0.02
-"""Size of an outlier in the usual steps, of an offset in the spread of the error, and of each relative to
-the travel, from which it is noted."""
+_ALONE, _SIZE = 10.0, 0.02  # size of an outlier in the usual steps, and in the travel, from which it is noted
 
 _USUAL = 0.98  # quantile of what is usual, beyond which are the samples that are looked for
 
@@ -355,11 +353,13 @@ def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterato
         yield Finding("late", words, {"lag": found.lag * log.T_s}, options=options)
     error = x - x_d[np.maximum(np.arange(len(x_d)) - found.lag_of_one, 0)]
     offset = float(np.nanmedian(error))
-    spread = float(np.nanmedian(np.abs(error - offset)))
-    if abs(offset) > max(_SIZE * _travel(x_d), _ALONE * spread):
+    spread = float(np.nanquantile(np.abs(error - offset), _USUAL))
+    if abs(offset) > max(spread, resolution(x)):
         words = (
-            f"the measured position is {log.shown.words(offset, '+.4g')} away from its command throughout, "
-            f"{abs(offset) / _travel(x_d):.2g} of the travel, while the error varies by {log.shown.words(spread)}"
+            f"the measured position is {log.shown.words(offset, '+.4g')} away from its command, while the error varies "
+            f"by {log.shown.words(spread)}: a compensator moves the axis by as much, which is right where it stands "
+            "beside its command, as under gravity; where only the zeros differ, take the offset away from the measured "
+            "column, and from what a compensator is to measure"
         )
         yield Finding("offset", words, {"offset": offset, "spread": spread})
 

@@ -1,5 +1,6 @@
 """What ``fit`` and ``report`` advise: more motion is asked for where there is little of it, and nowhere else."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -43,6 +44,17 @@ def test_more_motion_is_advised_where_there_is_little(hybrid: float, arx: float,
     advice = advice_on(judged(resting, hybrid, arx))
     assert advice.startswith(own)
     assert advice.endswith("judged by 25 windows; the axis moves in 10 % of the samples: record more motion.")
+
+
+@pytest.mark.parametrize("hybrid", [0.5e-6, 1e-6, 2e-6, 4e-6])
+@pytest.mark.parametrize("n", [N, N // 5])
+def test_a_hybrid_that_alone_began_trained_is_called_so(hybrid: float, n: int) -> None:
+    """Beside rivals that learn from nothing, in the sentence that compares them, whatever it advises."""
+    found = judged(1e-3 * np.sin(2 * np.pi * 3.3e-3 * np.arange(N)), hybrid, 1e-6)
+    cut = replace(found.replay, Np=NP * N // n)
+    sentence = re.compile(r"the hybrid \(which alone began trained\)[^.]*\d\.\d\d ×", re.IGNORECASE)
+    for warm in (False, True):
+        assert bool(sentence.search(advice_on(replace(found, replay=cut, warm=warm)))) == warm
 
 
 def test_a_difference_of_a_few_percent_is_none() -> None:

@@ -15,12 +15,15 @@ from quick_fits import without_larger_structures
 from staircase_data import commanded, measured
 
 from hybridsep import HybridPredictor, load_machine, read_log
+from hybridsep.app.fit import _next_steps
 from hybridsep.base.errors import ParameterError
 from hybridsep.cosim.loop import FmuController
 from hybridsep.fitting.build import fit_files
 from hybridsep.fitting.fit import Fit, fit
+from hybridsep.fitting.plant import IdentifiedPlant
 from hybridsep.fitting.replay import replay, split_log
 from hybridsep.fmi.weights import restore_weights, weights_file
+from hybridsep.logs.checks import Finding
 from hybridsep.machines.machine import machine_name
 
 N = 3000
@@ -240,6 +243,26 @@ def test_a_rotary_axis_stays_one_under_the_default_machines_name(short: Path, tm
     found = fit(replace(read_log(short), unit="rad"), Np=20, name="spring_mass_damper").build(tmp_path, report=False)
     assert load_machine(tmp_path / "machine.toml").unit == "rad"
     assert all(path.exists() for path in found.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("disturbed", "noted", "said"),
+    [
+        (True, [], ""),
+        (True, ["late", "offset"], ", without the log's offset and so without --weights"),
+        (False, ["offset"], ", without the log's friction and stiffness and so without --weights"),
+    ],
+)
+def test_weights_are_advised_on_a_plant_that_has_what_they_learned(
+    fitted: Fit, disturbed: bool, noted: list[str], said: str
+) -> None:
+    notes = {"axis.csv": [Finding(name, "", {}) for name in noted]}
+    found = replace(fitted, findings=notes, plant=IdentifiedPlant({"mode": []} if disturbed else {}))
+    lines = _next_steps(found, {"machine file": Path("a.toml"), "trained predictor": Path("a.state")})
+    assert f"  # the compensated axis, on the identified model{said}: to try with, results are optimistic" in lines
+    weights = "" if said else " --weights a.state"
+    assert f"  hybridsep cosim -m a.toml --compensate hybrid{weights}" in lines
 
 
 @pytest.mark.parametrize(

@@ -125,7 +125,9 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     change_max = 0.3 * float(np.abs(x_d - x).max())
     machine = axis({"velocity": 0.3, "acceleration": 30.0, "jerk": 2e4, "change_max": change_max})
     found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None)
-    found = replace(found, largest=1.5 * change_max, fastest=0.5)
+    found = replace(
+        found, largest=1.5 * change_max, motion={"v_max": (0.5, 0.3), "a_max": (30.0, 30.0), "j_max": (2.5e4, 2e4)}
+    )
     assert found.limits["hybrid"]["change_max"] > 0.1
     assert found.costs is not None
     assert list(found.costs.effects) == ["a_max", "j_max", "change_max"]
@@ -141,6 +143,8 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     beyond = f"{0.5e6 * change_max:.4g} µm of it cannot be compensated."
     assert f"The largest servo error of the log, {1.5e6 * change_max:.4g} µm, is above change_max: {beyond}" in said
     assert "The log's commands reach 500 mm/s, above v_max = 300 mm/s: where they do, it bounds" in said
+    assert "The log's commands reach 2.5e+07 mm/s³, above j_max = 2e+07 mm/s³: where they do, it bounds" in said
+    assert "above a_max" not in said
     assert "set change_max to twice that error; motion" in said
     assert "following_error_max is 0: nothing trips." in said
 
@@ -178,15 +182,19 @@ def test_all_three_limits_are_needed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("sizes", "advised"),
+    ("sizes", "off", "advised"),
     [
-        ({"change_max": {0.5: 1.0, 1.0: 1.0, 2.0: 1.0}}, []),  # half of it costs nothing, and gains nothing
-        ({"change_max": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}}, ["change_max"]),
-        ({"acceleration": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}, "change_max": {0.5: 3.0, 1.0: 1.0, 2.0: 0.9}}, []),
+        ({"change_max": {0.5: 1.0, 1.0: 1.0, 2.0: 1.0}}, 9.0, []),  # half of it costs nothing, and gains nothing
+        ({"change_max": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}}, 9.0, ["change_max"]),
+        ({"change_max": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}}, 200.0, []),  # little is left of the error today
+        ({"change_max": {0.5: 2.0, 1.0: 1.0, 2.0: [0.5, 1.1]}}, 9.0, []),  # the largest error rises
+        ({"acceleration": {0.5: 2.0, 1.0: 1.0, 2.0: 0.9}, "change_max": {0.5: 3.0, 1.0: 1.0, 2.0: 0.9}}, 9.0, []),
     ],
 )
-def test_what_is_advised_gains_something(sizes: dict[str, dict[float, float]], advised: list[str]) -> None:
-    """Alone and together: in the last case both leave as much as today."""
+def test_what_is_advised_gains_something(
+    sizes: dict[str, dict[float, float | list[float]]], off: float, advised: list[str]
+) -> None:
+    """Alone and together: in the last case both leave as much as today. ``off`` is the error without compensation."""
     limits = {"velocity": 0.1, "acceleration": 1.0, "jerk": 10.0, "change_max": 1e-3}
     x_d = command()[:200]
 
@@ -197,6 +205,6 @@ def test_what_is_advised_gains_something(sizes: dict[str, dict[float, float]], a
             factors = {"acceleration": settings.limits.acceleration, "change_max": settings.change_max / 1e-3}
             changed = [(name, factor) for name, factor in factors.items() if factor != 1.0]
             size = sizes.get(changed[0][0], {}).get(changed[0][1], 1.0) if len(changed) == 1 else 1.0
-            return Expected(x_d, np.full(Np, size), x_d, x_d)
+            return Expected(x_d, np.resize(size, Np), x_d, x_d)
 
-    assert list(Drawn(axis(limits), x_d, x_d, slice(None)).limit_costs().advised) == advised
+    assert list(Drawn(axis(limits), x_d, x_d - off, slice(None)).limit_costs().advised) == advised

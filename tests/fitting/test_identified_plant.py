@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from hybridsep import Limits, ModalModel, Mode, rest_to_rest, simulate
+from hybridsep.base.metrics import peak_derivatives
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.fitting.compensation import estimated_limits
+from hybridsep.fitting.compensation import estimated_limits, largest_motion
 from hybridsep.fitting.plant import commands_to_try, identified_plant
 from hybridsep.fitting.replay import Recording
 from hybridsep.logs.units import shown_in
@@ -71,6 +72,27 @@ def test_commands_begin_where_the_log_began_and_end_at_rest() -> None:
     assert np.ptp(tried) == pytest.approx(np.ptp(x_d), rel=0.3)
     assert np.abs(np.diff(tried[-2:])[0]) < 1e-3 * np.abs(np.diff(x_d)).max()
     assert len(commands_to_try([Recording(rest, rest, 9)])) == 20_000
+
+
+@pytest.mark.parametrize("held", [1, 4])
+@pytest.mark.parametrize("rounded", [0.0, 1e-7, 1e-6, 1e-5])
+@pytest.mark.parametrize("rest", [0.2, 20.0])
+def test_motion_is_estimated_without_what_holds_or_rounds_a_command(held: int, rounded: float, rest: float) -> None:
+    """At 4 kHz, where 1 µm is 16 m/s² and 64 000 m/s³ from sample to sample; mostly at rest, too."""
+    T_s, limits = 2.5e-4, Limits(0.5, 10.0, 700.0)
+    x_d = rest_to_rest([0.0, 0.09, 0.03, 0.15], limits, T_s, start_times=[rest, rest + 0.5, rest + 1.0])
+    x_d = x_d[np.arange(len(x_d)) // held * held]
+    x_d = rounded * np.round(x_d / rounded) if rounded else x_d
+    peaks, _ = largest_motion([Recording(x_d, x_d, 9)], T_s)
+    assert peaks == pytest.approx([0.5, 10.0, 700.0], rel=0.2)
+
+
+def test_steps_are_estimated_as_they_are() -> None:
+    """A step of the velocity between samples of one speed is no rounding, a step of the position no hold."""
+    k = np.arange(3000.0)
+    for x_d in (1e-3 * np.minimum(k % 300, 300 - k % 300), 0.01 * np.floor(k / 500 % 2)):
+        peaks, _ = largest_motion([Recording(x_d, x_d, 9)], T_S)
+        assert peaks == pytest.approx(peak_derivatives(x_d, T_S))
 
 
 def test_limits_are_estimated_from_the_motion() -> None:

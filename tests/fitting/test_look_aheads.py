@@ -9,6 +9,7 @@ from identification_cases import T_S
 from hybridsep import ModalModel, Mode, SepCompensator, rest_to_rest
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import Limits
+from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.fitting.compensation import LookAheads, Stretch
 from hybridsep.fitting.replay import Recording
@@ -88,6 +89,22 @@ def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
     n = round(found.duration / T_s)
     assert n < len(x_d) // 2
     assert found.off == pytest.approx(max(rms((x_d - x)[i : i + n]) for i in range(len(x_d) - n)), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("x_d", "most"),
+    [(0.02 * T_S * np.arange(6000.0), 1e-4), (0.005 * np.sin(2 * np.pi * 1.7 * T_S * np.arange(6000.0)), 0.1)],
+    ids=["feed", "sine"],  # whose plans wait where it turns
+)
+def test_a_stretch_that_is_cut_out_of_motion_is_led_in_and_out_at_rest(x_d: Array, most: float) -> None:
+    """A command that never rests: the largest error was that of its step to rest, where the stretch ends."""
+    stretch = Stretch.of(axis(SERVO, SERVO.look_ahead(T_S)), [Recording(x_d, x_d, 3000)])
+    assert stretch is not None
+    speed = np.abs(np.diff(stretch.x_d)) / T_S
+    assert max(speed[0], speed[-1]) < 1e-3 * speed.max()
+    found = stretch.look_aheads()
+    assert found.tried[-1].left < most * found.off
+    assert found.lines() == []
 
 
 def test_nothing_is_said_without_motion_or_of_an_error_that_the_model_does_not_know() -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -303,7 +304,7 @@ def held(x: Array) -> Array:
 NOTES: dict[str, Callable[[Log], Log]] = {
     "missing samples": lambda log: replace(log, x_meas=np.where(np.arange(len(log.t)) == 700, np.nan, log.x_meas)),
     "rate": lambda log: replace(log, t=log.t + 0.1 * log.T_s * np.sin(np.arange(len(log.t)))),
-    "offset": lambda log: replace(log, x_meas=log.x_meas + 0.3 * np.ptp(log.x_d)),
+    "offset": lambda log: replace(log, x_meas=log.x_meas + 0.02 * np.ptp(log.x_d)),
     "late": lambda log: replace(log, x_meas=np.concatenate((np.zeros(400), log.x_meas[:-400]))),
     "start in motion": lambda log: log_of(log.x_d[1200:] - log.x_d[1200], log.x_meas[1200:] - log.x_d[1200], log.T_s),
     "stuck samples": lambda log: replace(log, x_meas=held(log.x_meas)),
@@ -326,6 +327,23 @@ def test_what_is_noted_has_a_statistic_and_changes_nothing(name: str) -> None:
     assert name in found
     assert found[name].evidence
     assert str(found[name]).startswith(f"note: {name}: ")
+
+
+@pytest.mark.parametrize("rest", [0.1, 0.8])
+@pytest.mark.parametrize(("offset", "said"), [(0.0, False), (50e-6, False), (370e-6, True), (-370e-6, True)])
+def test_an_offset_is_noted_where_the_error_varies_by_less(rest: float, offset: float, said: bool) -> None:
+    """An axis of 0.16 m whose friction, 85 µm, stays at rest: a thousandth of the travel is no little offset to it."""
+    numbers, x_d, friction = np.random.default_rng(5), np.empty(0), np.empty(0)
+    for last, level in pairwise(numbers.uniform(0.0, 0.16, 60)):
+        n = round(500 * (1.0 - rest))
+        x_d = np.concatenate((x_d, np.linspace(last, level, n), np.full(500 - n, level)))
+        friction = np.concatenate((friction, np.full(500, 85e-6 * np.sign(level - last))))
+    x = np.pad(x_d, (3, 0), mode="edge")[: len(x_d)] - friction
+    found = {one.name: one for one in check(log_of(x_d, x + offset + 1e-7 * numbers.normal(size=len(x))))}
+    assert ("offset" in found) == said
+    if said:
+        assert found["offset"].evidence["offset"] == pytest.approx(offset, abs=90e-6)
+        assert "where only the zeros differ, take the offset away" in found["offset"].words
 
 
 def test_a_coarse_encoder_does_not_stand_behind_a_lag() -> None:
