@@ -55,8 +55,8 @@ def backtest(
     """
     from ..base.metrics import in_unit
     from ..evaluate.backtest import replayed_run
-    from ..fitting.advice import Judged, advice_on, extent, whole_log_words
-    from ..fitting.replay import Recording, knew, replay
+    from ..fitting.advice import Judged, advice_on, extent, settling_words, whole_log_words
+    from ..fitting.replay import Recording, knew, replay, settled
     from ..fmi.weights import warm_predictor
     from ..logs.checks import findings_table
     from ..logs.controller import controller_of
@@ -84,11 +84,12 @@ def backtest(
     shown = shown_of(read.file_unit, axis.unit)
     title = f"{axis.title}, {log.name}"
     with progress_bar(as_json) as advance:
-        recordings = [Recording(one.x_d, one.x_meas, 0) for one in read.segments()]
+        recordings = settled([Recording(one.x_d, one.x_meas, 0) for one in read.segments()], predictor.Np)
         replayed = replay(predictor, recordings, lambda done: advance("replay", 0.8 * done))
         replayed = replayed.with_peers(lambda done: advance("ARX models", 0.8 + 0.2 * done))
     known = weights is not None and knew(HybridPredictor.load(weights), predictor)
-    scores, words = replayed.backtest, whole_log_words(warm=weights is not None, known=known)
+    scores = replayed.backtest
+    words = whole_log_words(warm=weights is not None, known=known) + settling_words(replayed)
     judged = Judged(replayed, read.T_s, shown, "the whole log", known=known, controller=controller_of([read]))
     settings = predictor.settings
     run = replayed_run(*(scores, read.x_d, read.x_meas, read.T_s, settings.Np), measurement_delay=settings.n_late)

@@ -113,10 +113,11 @@ def read_log(
 ) -> Log:
     """Read a log as it was recorded: in the order of the file, every sample. Its units are said here, and nowhere else.
 
-    Measured positions that are missing are NaN. Gaps, and times that go back, begin another segment. What keeps the
-    file's meaning is done, and said in :attr:`Log.remarks`: the wraps of a counter and the whole turns of a rotary axis
-    are unwrapped, rows that repeat the one before, time included, are left out, and of a sensor that is renewed every n
-    samples the samples are taken in which it is new.
+    Measured positions that are missing are NaN. Up to 10 rows that are lost in a row are put back, where the times tell
+    how many they are: the command as the cubic through its neighbours, the measurement missing. Longer gaps, and times
+    that go back, begin another segment. What keeps the file's meaning is done, and said in :attr:`Log.remarks`: the
+    wraps of a counter and the whole turns of a rotary axis are unwrapped, rows that repeat the one before, time
+    included, are left out, and of a sensor that is renewed every n samples the samples are taken in which it is new.
 
     Parameters
     ----------
@@ -185,6 +186,7 @@ def read_log(
     remarks += times.remarks
     for change, wanted in (
         (whole_turns, log.unit == "rad"),
+        (partial(_bridged, lost=times.lost), bool(times.lost)),
         (_at_sensor_phase, True),
         (partial(_shifted, delay=delay), delay != 0),
         (_resampled, resample),
@@ -297,10 +299,6 @@ _ONE_PHASE, _CHANGES = 0.95, 50
 """Share of a slow sensor's changes that come in one sample of every n, which no other log of a hundred reached for any
 n, and fewest changes that show it."""
 
-_BRIDGED = 10
-"""Samples missing in a row that get rows of their own on request, a tenth of the default window: a command of 2 m/s² at
-1 kHz is interpolated within 0.3 µm over one of them, 30 µm over ten."""
-
 _UNEVEN = 0.05
 """Relative difference of an interval from the log's from which it counts as uneven: at a feed rate of 80 mm/s and
 1 kHz, 5 % of an interval are 4 µm of travel, comparable to the noise of an encoder."""
@@ -347,6 +345,35 @@ def _error(x_d: Array, x_meas: Array) -> float:
     error = x_d - x_meas
     error = error[np.isfinite(error)]
     return float(np.sqrt(np.mean((error - np.median(error)) ** 2)))
+
+
+def _bridged(given: Log, lost: Mapping[int, int]) -> tuple[Log, str]:
+    """Return the log with a row for each of those ``lost`` before a sample, of which its times have told."""
+    added = np.zeros(len(given.t), dtype=np.intp)
+    added[list(lost)] = list(lost.values())
+    parts = []
+    for part, own in zip(given.segments(), np.split(added, given.starts[1:]), strict=True):
+        place = np.arange(len(own)) + np.cumsum(own)
+        every = np.arange(place[-1] + 1)
+        rows = np.setdiff1d(every, place)
+        new = _at(part, np.searchsorted(place, every))
+        new.x_d[rows] = _cubic(place, part.x_d, rows)
+        for measured in (new.x_meas, *new.signals.values()):
+            measured[rows] = np.nan
+        parts.append(replace(new, t=np.interp(every, place, part.t)))
+    return _joined(parts), ""
+
+
+def _cubic(place: Indices, x: Array, at: Indices) -> Array:
+    """Return a signal between its samples: Newton's polynomial through the two on either side, at an end the next."""
+    n = min(4, len(place))
+    near = np.clip(np.searchsorted(place, at) - 2, 0, len(place) - n)[:, None] + np.arange(n)
+    places, differences, found = place[near], x[near], np.zeros(len(at))
+    for k in range(1, n):
+        differences[:, k:] = np.diff(differences[:, k - 1 :]) / (places[:, k:] - places[:, :-k])
+    for k in reversed(range(n)):
+        found = differences[:, k] + (at - places[:, k]) * found
+    return found
 
 
 def _at_sensor_phase(given: Log) -> tuple[Log, str]:
@@ -407,27 +434,27 @@ def uneven(t: Array, T_s: float, starts: tuple[int, ...]) -> Indices:
 
 
 def _resampled(given: Log) -> tuple[Log, str]:
-    """Return the log at even times, linearly between the given ones, with rows of their own in short gaps.
-
-    The measured position is missing in these, NaN. Of each segment the times begin with its own first one.
-    """
+    """Return the log at even times, linearly between the given ones; of each segment they begin with its own first."""
     T_s = given.T_s
-    n_lost = np.round(np.diff(given.t) / T_s)[np.array(given.starts[1:], dtype=np.intp) - 1] - 1.0
-    starts = [0, *(start for start, n in zip(given.starts[1:], n_lost, strict=True) if not 0 < n <= _BRIDGED)]
-    if len(starts) == len(given.starts) and not len(uneven(given.t, T_s, given.starts)):
+    if not len(uneven(given.t, T_s, given.starts)):
         return given, ""
     parts = []
-    for part in replace(given, starts=tuple(starts)).segments():
+    for part in given.segments():
         n = int((part.t[-1] - part.t[0]) / T_s + 1e-6) + 1
         t = part.t[0] + T_s * np.arange(n)
-        x_d, x_meas, *signals = (np.interp(t, part.t, x) for x in (part.x_d, part.x_meas, *part.signals.values()))
-        after = np.clip(np.searchsorted(part.t, t), 1, len(part.t) - 1)
-        apart = np.minimum(np.abs(part.t[after] - t), np.abs(t - part.t[after - 1]))
-        x_meas[apart > T_s / 2] = np.nan
+        x_meas, *signals = (_between(t, part.t, x, T_s) for x in (part.x_meas, *part.signals.values()))
         taken = dict(zip(part.signals, signals, strict=True))
-        parts.append(replace(part, t=t, x_d=x_d, x_meas=x_meas, signals=taken))
-    said = f"taken at even times, {T_s:g} s apart, linearly between samples; gaps of up to {_BRIDGED} have rows"
-    return _joined(parts), f"{said} without measurement (--resample)"
+        parts.append(replace(part, t=t, x_d=np.interp(t, part.t, part.x_d), x_meas=x_meas, signals=taken))
+    return _joined(parts), f"taken at even times, {T_s:g} s apart, linearly between samples (--resample)"
+
+
+def _between(t: Array, own: Array, x: Array, T_s: float) -> Array:
+    """Return a signal linearly between its known samples, NaN at times over half an interval from the nearest one."""
+    own, x = own[np.isfinite(x)], x[np.isfinite(x)]
+    if not len(own):
+        return np.full(len(t), np.nan)
+    nearest = own[np.searchsorted((own[1:] + own[:-1]) / 2, t)]
+    return np.where(np.abs(nearest - t) > T_s / 2, np.nan, np.interp(t, own, x))
 
 
 def _joined(parts: list[Log]) -> Log:
