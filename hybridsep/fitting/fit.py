@@ -216,7 +216,7 @@ class Fit:
         with atomic_open_text(files["machine file"]) as file:
             file.write(machine_text(self.machine, comments=self._comments()))
         commands = commands_to_try(self.judged.replay.recordings)
-        write_commands(files["commands to try"], commands, self.machine.T_s, self.machine.unit)
+        write_commands(files["commands to try"], commands, self.machine.T_s, self.logs[0].shown)
         with atomic_open(files["trained predictor"]) as state:
             state.write(self.trained)
         for i, (what, path) in enumerate(archives.items() if fmus else ()):
