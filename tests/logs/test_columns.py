@@ -93,8 +93,17 @@ def test_columns_in_a_struct_are_guessed_beside_those_that_are_named(tmp_path: P
         assert named.columns[left[1]] == left[0]
 
 
-def test_a_german_log(tmp_path: Path) -> None:
-    text = "Zeit [ms];Sollposition [mm];Istposition [mm]\n0;1,5;1\n2;2;1,5\n"
+@pytest.mark.parametrize(
+    "names",
+    [
+        "Sollposition [mm];Istposition [mm]",
+        "Solllage [mm];Istlage [mm]",
+        "X_SollPos [mm];X_IstPos [mm]",
+        "Lagesollwert Achse X [mm];Lageistwert Achse X [mm]",
+    ],
+)
+def test_a_german_log(tmp_path: Path, names: str) -> None:
+    text = f"Zeit [ms];{names}\n0;1,5;1\n2;2;1,5\n"
     log = read_log(write_csv(tmp_path / "log.csv", text))
     np.testing.assert_allclose((*log.t, *log.x_d, *log.x_meas), (0, 2e-3, 1.5e-3, 2e-3, 1e-3, 1.5e-3))
 
