@@ -56,7 +56,7 @@ def backtest(
     from ..base.metrics import in_unit
     from ..evaluate.backtest import replayed_run
     from ..fitting.advice import Judged, advice_on, extent, settling_words, whole_log_words
-    from ..fitting.replay import Recording, knew, replay, settled
+    from ..fitting.replay import knew, replay, split_log
     from ..fmi.weights import warm_predictor
     from ..logs.checks import findings_table
     from ..logs.controller import controller_of
@@ -84,7 +84,7 @@ def backtest(
     shown = shown_of(read.file_unit, axis.unit)
     title = f"{axis.title}, {log.name}"
     with progress_bar(as_json) as advance:
-        recordings = settled([Recording(one.x_d, one.x_meas, 0) for one in read.segments()], predictor.Np)
+        recordings = split_log([(one.x_d, one.x_meas) for one in read.segments()], 0.0, predictor.Np)
         replayed = replay(predictor, recordings, lambda done: advance("replay", 0.8 * done))
         replayed = replayed.with_peers(lambda done: advance("ARX models", 0.8 + 0.2 * done))
     known = weights is not None and knew(HybridPredictor.load(weights), predictor)

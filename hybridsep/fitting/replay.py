@@ -48,28 +48,22 @@ class Recording:
 def split_log(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: int = 0) -> list[Recording]:
     """Split one log, the pieces ``(x_d, x)`` between its gaps, where the share of its samples for training is over.
 
-    SignalError if a part is left without samples.
+    ``n_settling`` samples after each gap are no test samples, unless fewer than half of the test samples were left.
+
+    SignalError if the test is left without samples.
     """
     given = list(pieces)
     n = sum(len(x_d) for x_d, _ in given)
     left = round(share * n)
-    if not 0 < left < n:
-        raise SignalError(f"a log of {n} samples has none to train or none to test with a share of {share:g}")
+    if not 0 <= left < n:
+        raise SignalError(f"a log of {n} samples has none to test with a share of {share:g} to train")
     found = []
     for x_d, x in given:
         found.append(Recording(x_d, x, min(left, len(x_d))))
         left -= found[-1].n_train
-    return settled(found, n_settling)
-
-
-def settled(recordings: Sequence[Recording], n: int) -> list[Recording]:
-    """Return the pieces of a log between its gaps with ``n`` samples after each that are no test samples.
-
-    They stay test samples where fewer than half of these were left.
-    """
-    found = [*recordings[:1], *(replace(one, n_settling=min(n, len(one.x))) for one in recordings[1:])]
-    left, most = (sum(len(one.x) - one.judges_from for one in each) for each in (found, recordings))
-    return found if 2 * left >= most else list(recordings)
+    settled = [*found[:1], *(replace(one, n_settling=min(n_settling, len(one.x))) for one in found[1:])]
+    left, most = (sum(len(one.x) - one.judges_from for one in each) for each in (settled, found))
+    return settled if 2 * left >= most else found
 
 
 def beginnings(recordings: Sequence[Recording], n_most: int) -> list[Recording]:

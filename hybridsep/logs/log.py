@@ -186,10 +186,10 @@ def read_log(
     remarks += times.remarks
     for change, wanted in (
         (whole_turns, log.unit == "rad"),
-        (partial(_bridged, lost=times.lost), bool(times.lost)),
+        (partial(_even, lost=times.lost), times.lost is not None),
         (_at_sensor_phase, True),
         (partial(_shifted, delay=delay), delay != 0),
-        (_resampled, resample),
+        (_even, resample),
     ):
         if wanted:
             log, said = change(log)
@@ -347,35 +347,6 @@ def _error(x_d: Array, x_meas: Array) -> float:
     return float(np.sqrt(np.mean((error - np.median(error)) ** 2)))
 
 
-def _bridged(given: Log, lost: Mapping[int, int]) -> tuple[Log, str]:
-    """Return the log with a row for each of those ``lost`` before a sample, of which its times have told."""
-    added = np.zeros(len(given.t), dtype=np.intp)
-    added[list(lost)] = list(lost.values())
-    parts = []
-    for part, own in zip(given.segments(), np.split(added, given.starts[1:]), strict=True):
-        place = np.arange(len(own)) + np.cumsum(own)
-        every = np.arange(place[-1] + 1)
-        rows = np.setdiff1d(every, place)
-        new = _at(part, np.searchsorted(place, every))
-        new.x_d[rows] = _cubic(place, part.x_d, rows)
-        for measured in (new.x_meas, *new.signals.values()):
-            measured[rows] = np.nan
-        parts.append(replace(new, t=np.interp(every, place, part.t)))
-    return _joined(parts), ""
-
-
-def _cubic(place: Indices, x: Array, at: Indices) -> Array:
-    """Return a signal between its samples: Newton's polynomial through the two on either side, at an end the next."""
-    n = min(4, len(place))
-    near = np.clip(np.searchsorted(place, at) - 2, 0, len(place) - n)[:, None] + np.arange(n)
-    places, differences, found = place[near], x[near], np.zeros(len(at))
-    for k in range(1, n):
-        differences[:, k:] = np.diff(differences[:, k - 1 :]) / (places[:, k:] - places[:, :-k])
-    for k in reversed(range(n)):
-        found = differences[:, k] + (at - places[:, k]) * found
-    return found
-
-
 def _at_sensor_phase(given: Log) -> tuple[Log, str]:
     """Return the log of the samples in which a slow sensor is new, where the measurement is renewed every n samples.
 
@@ -433,28 +404,47 @@ def uneven(t: Array, T_s: float, starts: tuple[int, ...]) -> Indices:
     return np.asarray(np.flatnonzero(deviations > _UNEVEN) + 1)
 
 
-def _resampled(given: Log) -> tuple[Log, str]:
-    """Return the log at even times, linearly between the given ones; of each segment they begin with its own first."""
-    T_s = given.T_s
-    if not len(uneven(given.t, T_s, given.starts)):
+def _even(given: Log, lost: Indices | None = None) -> tuple[Log, str]:
+    """Return the log with a row for each of those ``lost`` before each sample, (n,); without them at even times.
+
+    The command is the cubic through its neighbours, or at times of a clock, which may repeat, linear between them.
+    """
+    if lost is None and not len(uneven(given.t, given.T_s, given.starts)):
         return given, ""
+    places = given.t / given.T_s if lost is None else np.arange(float(len(lost))) + np.cumsum(lost)
     parts = []
-    for part in given.segments():
-        n = int((part.t[-1] - part.t[0]) / T_s + 1e-6) + 1
-        t = part.t[0] + T_s * np.arange(n)
-        x_meas, *signals = (_between(t, part.t, x, T_s) for x in (part.x_meas, *part.signals.values()))
+    for part, own in zip(given.segments(), np.split(places, given.starts[1:]), strict=True):
+        rows = own - own[0]
+        at = np.arange(int(rows[-1] + 1e-6) + 1)
+        x_d = np.interp(at, rows, part.x_d) if lost is None else _cubic(rows, part.x_d, at)
+        x_meas, *signals = (_between(rows, x, at) for x in (part.x_meas, *part.signals.values()))
         taken = dict(zip(part.signals, signals, strict=True))
-        parts.append(replace(part, t=t, x_d=np.interp(t, part.t, part.x_d), x_meas=x_meas, signals=taken))
-    return _joined(parts), f"taken at even times, {T_s:g} s apart, linearly between samples (--resample)"
+        parts.append(replace(part, t=np.interp(at, rows, part.t), x_d=x_d, x_meas=x_meas, signals=taken))
+    said = f"taken at even times, {given.T_s:g} s apart, linearly between samples (--resample)"
+    return _joined(parts), said if lost is None else ""
 
 
-def _between(t: Array, own: Array, x: Array, T_s: float) -> Array:
-    """Return a signal linearly between its known samples, NaN at times over half an interval from the nearest one."""
-    own, x = own[np.isfinite(x)], x[np.isfinite(x)]
-    if not len(own):
-        return np.full(len(t), np.nan)
-    nearest = own[np.searchsorted((own[1:] + own[:-1]) / 2, t)]
-    return np.where(np.abs(nearest - t) > T_s / 2, np.nan, np.interp(t, own, x))
+def _cubic(rows: Array, x: Array, at: Indices) -> Array:
+    """Return a signal between its samples: Newton's polynomial through the two on either side, at an end the next."""
+    n = min(4, len(rows))
+    near = np.clip(np.searchsorted(rows, at) - 2, 0, len(rows) - n)[:, None] + np.arange(n)
+    order = np.argsort(np.abs(rows[near] - at[:, None]), axis=1)  # exact at a sample, which is the first then
+    near = np.take_along_axis(near, order, axis=1)
+    places, differences, found = rows[near], x[near], np.zeros(len(at))
+    for k in range(1, n):
+        differences[:, k:] = np.diff(differences[:, k - 1 :]) / (places[:, k:] - places[:, :-k])
+    for k in reversed(range(n)):
+        found = differences[:, k] + (at - places[:, k]) * found
+    return found
+
+
+def _between(rows: Array, x: Array, at: Indices) -> Array:
+    """Return a signal linearly between its known samples, NaN over half a row from the nearest one."""
+    rows, x = rows[np.isfinite(x)], x[np.isfinite(x)]
+    if not len(rows):
+        return np.full(len(at), np.nan)
+    nearest = rows[np.searchsorted((rows[1:] + rows[:-1]) / 2, at)]
+    return np.where(np.abs(nearest - at) > 0.5, np.nan, np.interp(at, rows, x))
 
 
 def _joined(parts: list[Log]) -> Log:

@@ -1,8 +1,7 @@
 """Times of a log: counters that wrap, gaps and clocks that were set back, the interval between the samples."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +47,7 @@ class Times:
     T_s: float  # sampling interval, s
     starts: tuple[int, ...] = (0,)  # first samples of the segments; the first is 0
     remarks: tuple[str, ...] = ()  # what was unwrapped, what is missing, and why segments begin
-    lost: Mapping[int, int] = field(default_factory=dict)  # sample → rows lost before it, in short gaps within segments
+    lost: Indices | None = None  # (n,): rows lost before each sample, in short gaps within segments; None without any
 
 
 @np.errstate(over="ignore", invalid="ignore")  # times may be any finite numbers
@@ -88,10 +87,9 @@ def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated
             "T_s out, or correct it or the column"
         )
     gaps, lost = _gaps(t, interval)
-    starts, short = gaps[lost == 0], gaps[lost > 0]
-    words = (*_words(t, short, T_s, _PUT_BACK), *_words(t, starts, T_s))
-    short_ones = dict(zip(short.tolist(), lost[lost > 0].tolist(), strict=True))
-    return Times(t, T_s, (0, *starts.tolist()), (*remarks, *words), short_ones)
+    starts = gaps[lost[gaps] == 0]
+    words = (*_words(t, np.flatnonzero(lost), T_s, _PUT_BACK), *_words(t, starts, T_s))
+    return Times(t, T_s, (0, *starts.tolist()), (*remarks, *words), lost if lost.any() else None)
 
 
 def _unwrapped(t: Array) -> tuple[Array, tuple[str, ...]]:
@@ -189,7 +187,7 @@ def _words(t: Array, at: Indices, T_s: float, what: str = "another segment begin
 def _gaps(t: Array, T_s: float) -> tuple[Indices, Indices]:
     """Return the samples that are later than the one before by over an interval, or earlier, and all after them.
 
-    And the rows that are lost before each, 0 where the times do not tell how many, or they are too many to put back.
+    And the rows that are lost before every sample: none where times do not tell how many, or these are too many.
     """
     steps = np.diff(t) / T_s
     at = np.flatnonzero((steps > _GAP) | (steps < 1.0 - _GAP)) + 1
@@ -202,10 +200,10 @@ def _gaps(t: Array, T_s: float) -> tuple[Indices, Indices]:
         # Once more without these, which may hide one a few samples beside
         found, at = np.union1d(found, at[is_start]), at[~is_start]
     late = steps[found - 1] - 1.0 + _late(steps, found, found)
-    lost = np.round(late)
+    lost, rows = np.zeros(len(t), dtype=np.intp), np.round(late)
     whole = min(_WHOLE + _JITTER * float(np.median(np.abs(steps - 1.0))), _WHOLE_MAX)
-    is_told = (np.abs(late - lost) <= whole) & (lost > 0.0) & (lost <= _BRIDGED)
-    return found, np.where(is_told, lost, 0.0).astype(np.intp)
+    lost[found] = np.where((np.abs(late - rows) <= whole) & (rows > 0.0) & (rows <= _BRIDGED), rows, 0.0)
+    return found, lost
 
 
 def _late(steps: Array, at: Indices, known: Indices) -> Array:
@@ -222,11 +220,10 @@ def _mean_interval(t: Array) -> tuple[float, float]:
     """Return the mean interval, segments apart, and its relative standard error if times scatter independently."""
     steps = np.diff(t)
     interval = float(np.median(steps[steps > 0.0]))
-    rows = np.ones(len(steps))  # intervals in each step, 0 between segments
     for _ in range(2):  # once more with the mean, as jitter moves a median
         gaps, lost = _gaps(t, interval)
-        rows[:] = 1.0
-        rows[gaps - 1] = np.where(lost > 0, lost + 1.0, 0.0)
+        rows = lost[1:] + 1.0  # in each step, none between segments
+        rows[gaps[lost[gaps] == 0] - 1] = 0.0
         if steps[rows > 0.0].sum() > 0.0:
             interval = float(steps[rows > 0.0].sum() / rows.sum())
     inner = rows > 0.0
