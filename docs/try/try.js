@@ -18,13 +18,13 @@ const SUFFIXES = ["mm", "um", "nm", "rad", "mrad", "urad", "deg", "s", "ms", "us
 const THOUSANDS = /^[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$/;
 const TURN = 2 * Math.PI;
 const NAMES = { // in small letters, by precedence, as hybridsep/logs/names.py
-  t: "t time timestamp time_stamp zeit",
+  t: "t time timestamp time_stamp sec seconds zeit",
   x_d: "x_d xd x_ref xref x_cmd x_set x_des reference setpoint set_point command commanded " +
     "position_commanded commanded_position pos_cmd cmd_pos pos_ref pos_set ctrl_pos des_pos q_d " +
-    "sollposition lagesollwert",
+    "sollposition solllage lagesollwert",
   x: "x_meas x x_m x_act measured measurement actual position_measured measured_position actual_position " +
     "position_actual pos_meas pos_act act_pos enc_pos feedback q_meas process_value istposition " +
-    "lageistwert",
+    "istlage lageistwert",
 };
 const DEAD_TIMES = 21; // samples: 0 to 20 are tried
 const ARX_LAGS = [20, 40];

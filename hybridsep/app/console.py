@@ -22,6 +22,7 @@ from ..base.metrics import in_unit, rms_ratio, shown_figure
 if TYPE_CHECKING:
     from ..cosim.run import Run
     from ..fitting.advice import Judged
+    from ..logs.units import DisplayUnits
     from ..machines.machine import Machine
 
 
@@ -59,11 +60,12 @@ def print_rows(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -
     console.print(table)
 
 
-def print_run(run: "Run", as_json: bool, title: str, unit: str, limits: Mapping[str, Any] | None = None) -> None:
+def print_run(
+    run: "Run", as_json: bool, title: str, unit: str, shown: "DisplayUnits", limits: Mapping[str, Any] | None = None
+) -> None:
     """Print the figures of a run of positions in ``unit``, m or rad; of ``limits`` what binds the command."""
     from ..cosim.run import PREDICTOR
     from ..evaluate.verdict import verdict_of
-    from ..logs.units import shown_in
 
     summary = run.summary()
     if as_json:
@@ -71,26 +73,25 @@ def print_run(run: "Run", as_json: bool, title: str, unit: str, limits: Mapping[
         print_json({**named, **({"verdict": str(verdict_of(run))} if run.kind == PREDICTOR else limits or {})})
         return
     if run.kind != PREDICTOR:
-        _print_tracking(summary, title, unit, limits)
+        _print_tracking(summary, title, unit, shown, limits)
         return
-    scale, shown = shown_in(unit).error(1e-6 * summary["rms_pb_um"])
+    scale, name = shown.error(1e-6 * summary["rms_pb_um"])
     rows = []
     for label, size in (("RMS", "rms"), ("largest", "max")):
-        figures = [1e-6 * scale * summary[f"{size}_{name}_um"] for name in ("pb", "hold", "h")]
+        figures = [1e-6 * scale * summary[f"{size}_{by}_um"] for by in ("pb", "hold", "h")]
         rows.append([label, *map(shown_figure, (*figures, rms_ratio(figures[2], figures[1])))])
-    title = f"{title}: prediction error in {shown} against the measured position"
+    title = f"{title}: prediction error in {name} against the measured position"
     print_rows(title, ["", "physics", "hold", "hybrid", "× hold"], rows)
     console.print(str(verdict_of(run)))
 
 
 def _print_tracking(
-    summary: Mapping[str, float | int], title: str, unit: str, limits: Mapping[str, Any] | None
+    summary: Mapping[str, float], title: str, unit: str, shown: "DisplayUnits", limits: Mapping[str, Any] | None
 ) -> None:
     from ..fitting.compensation import binding_words
-    from ..logs.units import shown_in
 
-    factor, position = shown_in(unit).position
-    scale, shown = shown_in(unit).error(1e-6 * summary["tracking_rms_um"])
+    factor, position = shown.position
+    scale, small = shown.error(1e-6 * summary["tracking_rms_um"])
     rows = [
         [label, *(shown_figure(1e-6 * scale * summary[f"{name}_{quantity}_um"]) for quantity in ("rms", "max"))]
         for name, label in (
@@ -99,7 +100,7 @@ def _print_tracking(
             ("change", "change of the command"),
         )
     ]
-    print_rows(title, ["", f"RMS [{shown}]", f"max [{shown}]"], rows)
+    print_rows(title, ["", f"RMS [{small}]", f"max [{small}]"], rows)
     peaks = [summary[f"peak_{name}"] for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")]
     console.print(
         f"command to the drive: at most {factor * peaks[0]:.1f} {position}/s, {peaks[1]:.2f} {unit}/s², "

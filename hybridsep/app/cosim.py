@@ -67,7 +67,7 @@ def cosim(
     from ..fitting.compensation import Stretch
     from ..fitting.replay import Recording
     from ..fmi.archive import build_here
-    from ..logs.units import shown_in
+    from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path
     from .console import RUNS, check_outputs, console, print_run, print_written, progress_bar
 
@@ -77,9 +77,9 @@ def cosim(
     if compensate is not None:
         check("compensate", compensate, label="--compensate")
     axis = load_machine(machine, entries or ())
-    shown = shown_in(axis.unit)
     model = "HybridPredictor" if compensate is None else "SepCompensator"
-    trajectory, command = _command(trajectory, machine, axis, unit)
+    trajectory, command, of_file = _command(trajectory, machine, axis, unit)
+    shown = shown_of(of_file or axis.log.unit or "", axis.unit)
     _check_pair(axis, model, predictor, plant, weights, entries or ())
     inputs = {"trajectory": _file(trajectory), "predictor": predictor, "plant": plant, "saved predictor": weights}
     outputs = (("--out", out, RUNS), ("--figure", figure, (".png",)))
@@ -108,7 +108,7 @@ def cosim(
     elif figure is not None:
         tracking_figure({str(compensate): run}, title, figure, shown)
     bound = None if limits is None else {"limits_that_bind": limits, "limit_costs": costs}
-    print_run(run, as_json, title, axis.unit, bound)
+    print_run(run, as_json, title, axis.unit, shown, bound)
     if not as_json:
         for line in () if costs is None else costs.lines(shown, "--set drive_limits.{entry}="):
             console.print(line)
@@ -208,13 +208,13 @@ def _file(trajectory: str) -> str | None:
     return None if trajectory in options.TRAJECTORIES else trajectory
 
 
-def _command(trajectory: str | None, machine: str, axis: Machine, unit: str | None) -> tuple[str, Array]:
-    """Return the trajectory that is meant, and its samples at the machine's interval.
+def _command(trajectory: str | None, machine: str, axis: Machine, unit: str | None) -> tuple[str, Array, str]:
+    """Return the trajectory that is meant, its samples at the machine's interval, and the unit of its file or "".
 
     Where none is given it is a fit's commands beside the machine file, else the staircase.
     """
-    from ..logs.log import check_reading
-    from ..plants.trajectory import PAPER_LIMITS, read_trajectory, spiral, staircase
+    from ..logs.log import check_reading, read_log
+    from ..plants.trajectory import PAPER_LIMITS, spiral, staircase
 
     check_reading(unit, None)
     if trajectory is None:
@@ -222,10 +222,11 @@ def _command(trajectory: str | None, machine: str, axis: Machine, unit: str | No
         trajectory = str(beside) if machine.endswith(".toml") and beside.is_file() else options.TRAJECTORIES[0]
     limits = PAPER_LIMITS if axis.limits is None else axis.trajectory_limits()
     if trajectory == "staircase":
-        return trajectory, staircase(axis.T_s, limits=limits)
+        return trajectory, staircase(axis.T_s, limits=limits), ""
     if trajectory in options.TRAJECTORIES:
-        return trajectory, spiral(axis.T_s, limits=limits)[trajectory == "spiral_y"]
-    return trajectory, read_trajectory(trajectory, unit=unit, T_s=axis.T_s)[0]
+        return trajectory, spiral(axis.T_s, limits=limits)[trajectory == "spiral_y"], ""
+    log = read_log(trajectory, columns={"x_d": "x_d", "x": "x_d"}, unit=unit, T_s=axis.T_s)
+    return trajectory, log.x_d, log.file_unit if log.unit_stated else ""
 
 
 def _check_pair(
@@ -283,7 +284,7 @@ def system(
     axis = load_machine(machine)
     out = out or Path(f"{axis.name}.ssp")
     check_system(axis, compensate=compensate, ssp=ssp)
-    trajectory, command = _command(trajectory, machine, axis, unit)
+    trajectory, command, _ = _command(trajectory, machine, axis, unit)
     check_available(target or ("host",))
     inputs = {"machine file": machine_path(machine), "trajectory": _file(trajectory), "saved predictor": weights}
     check_outputs([("--out", out, (".ssp",))], inputs, force=force)

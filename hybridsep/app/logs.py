@@ -55,8 +55,8 @@ def backtest(
     """
     from ..base.metrics import in_unit
     from ..evaluate.backtest import replayed_run
-    from ..fitting.advice import Judged, advice_on, extent, whole_log_words
-    from ..fitting.replay import Recording, knew, replay
+    from ..fitting.advice import Judged, advice_on, extent, settling_words, whole_log_words
+    from ..fitting.replay import knew, replay, split_log
     from ..fmi.weights import warm_predictor
     from ..logs.checks import findings_table
     from ..logs.controller import controller_of
@@ -84,12 +84,12 @@ def backtest(
     shown = shown_of(read.file_unit, axis.unit)
     title = f"{axis.title}, {log.name}"
     with progress_bar(as_json) as advance:
-        recordings = [Recording(one.x_d, one.x_meas, 0) for one in read.segments()]
+        recordings = split_log([(one.x_d, one.x_meas) for one in read.segments()], 0.0, predictor.Np)
         replayed = replay(predictor, recordings, lambda done: advance("replay", 0.8 * done))
         replayed = replayed.with_peers(lambda done: advance("ARX models", 0.8 + 0.2 * done))
     known = weights is not None and knew(HybridPredictor.load(weights), predictor)
     warm, controller = weights is not None, controller_of([read])
-    scores, words = replayed.backtest, whole_log_words(warm=warm, known=known)
+    scores, words = replayed.backtest, whole_log_words(warm=warm, known=known) + settling_words(replayed)
     judged = Judged(replayed, read.T_s, shown, "the whole log", known=known, warm=warm, controller=controller)
     settings = predictor.settings
     run = replayed_run(*(scores, read.x_d, read.x_meas, read.T_s, settings.Np), measurement_delay=settings.n_late)

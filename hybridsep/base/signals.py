@@ -119,7 +119,7 @@ def _as_array(values: Any, name: str, factor: Callable[[str], float] | None = No
             i = int(np.argmin(even))
             raise SignalError(
                 f"the index of {name} must be even, it goes from {labels[i]} to {labels[i + 1]} at sample {i + 1}; "
-                "read_log makes another segment of what follows a gap"
+                "read_log puts a few rows back, and begins another segment after a longer gap"
             )
     return np.asarray((factor(given.unit) if factor else 1.0) * given.values, dtype=np.float64, order="C")
 

@@ -2,7 +2,7 @@
 
 import html
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
@@ -84,6 +84,14 @@ class Line:
     points: bool = False  # whether points are drawn instead of a line
     panel: int = 0  # panel, from 0, top first
 
+    def cut(self, at: Sequence[int]) -> "list[Line]":
+        """Return its pieces before and from the samples ``at`` on, between which nothing is drawn."""
+        rows = (
+            [None] * (len(at) + 1) if row is None else np.split(np.asarray(row), at)
+            for row in (self.x, self.y, self.upper)
+        )
+        return [replace(self, x=x, y=y, upper=upper) for x, y, upper in zip(*rows, strict=True) if len(x)]
+
     def draw(self, figure: "Figure") -> None:
         """Draw it into its panel."""
         edges = (self.y,) if self.upper is None else (self.y, self.upper)
@@ -101,7 +109,8 @@ class Line:
                 np.concatenate([[], *((*there[i:j], *back[i:j][::-1], np.nan) for i, j in ends)])
                 for there, back in ((x, x), (y, upper[0]))
             )
-        common = {"name": self.name, "legendgroup": self.name, "showlegend": bool(self.name)}
+        is_new = all(one.name != self.name for one in figure.data)
+        common = {"name": self.name, "legendgroup": self.name, "showlegend": bool(self.name) and is_new}
         figure.add_scatter(x=x, y=y, row=self.panel + 1, col=1, **common, **style)
 
 

@@ -79,6 +79,13 @@ def whole_log_words(*, warm: bool, known: bool) -> str:
     )
 
 
+def settling_words(replayed: Replay) -> str:
+    """Return which windows of a log with gaps are no test windows, in words; empty where all are."""
+    if not any(one.judges_from > one.n_train for one in replayed.recordings):
+        return ""
+    return " The window after a gap is no test window: no model knows the state of the axis there."
+
+
 def advice_on(judged: Judged) -> str:
     """Return what to do, in words; with caution where there are few test windows.
 

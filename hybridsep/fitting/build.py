@@ -7,6 +7,7 @@ from ..base.files import COMMANDS, atomic_open_text
 from ..base.signals import Array
 from ..fmi.compile import no_native
 from ..fmi.spec import fmu_name
+from ..logs.units import DisplayUnits
 
 
 def fit_files(out: Path, name: str, *, compensator: bool = False) -> dict[str, Path]:
@@ -23,11 +24,12 @@ def fit_files(out: Path, name: str, *, compensator: bool = False) -> dict[str, P
     }
 
 
-def write_commands(path: Path, x_d: Array, T_s: float, unit: str) -> None:
-    """Write commands as a CSV that ``--trajectory`` takes, m, or rad where that is the unit."""
+def write_commands(path: Path, x_d: Array, T_s: float, shown: DisplayUnits) -> None:
+    """Write commands, m or rad, as a CSV that ``--trajectory`` takes, in the unit in which positions are shown."""
+    factor, unit = shown.position
     with atomic_open_text(path) as file:
         file.write(f"# commands of a log, by hybridsep fit, to try with\nt [s],x_d [{unit}]\n")
-        file.writelines(f"{k * T_s:.9g},{position!r}\n" for k, position in enumerate(x_d.tolist()))
+        file.writelines(f"{k * T_s:.9g},{position!r}\n" for k, position in enumerate((factor * x_d).tolist()))
 
 
 def sha256_of(path: Path) -> str:

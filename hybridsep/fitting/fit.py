@@ -31,7 +31,7 @@ from ..machines.machine import Machine, checked_name, machine_text
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
-from .advice import Judged, advice_on
+from .advice import Judged, advice_on, settling_words
 from .build import fit_files, sha256_of, write_commands
 from .choice import Tried, choose_settings, period_finding, settings_to_try, with_window
 from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking, taught
@@ -56,10 +56,6 @@ _SHARE = 0.5  # share of each log's samples for training; the rest is held out f
 _TRIED_MAX = 20_000
 """Leading samples on which settings are tried and a plant is fitted, 20 s at 1 kHz: a fit of a minute's log took twice
 as long without."""
-
-_SETTLING = (
-    " The window after a gap is no test window: no model knows the state of the axis there; a controller has no gaps."
-)
 
 Progress = Callable[[str, float], object]
 
@@ -165,11 +161,10 @@ class Fit:
         if Path(path).is_dir():
             raise IsADirectoryError(errno.EISDIR, "the report's path must be a file", str(path))
         fmus, judged = [fmus] if isinstance(fmus, str) else fmus, self.judged
-        settled = any(one.judges_from > one.n_train for one in judged.replay.recordings)
         report = begun_report(
             *(f"Axis {self.machine.name}: from its log to its FMU", self.logs, judged, "Tested on held-out samples"),
             "The first half of each log trained the physics model and chose the settings; these are the errors of the "
-            "second half." + (_SETTLING if settled else ""),
+            f"second half.{settling_words(judged.replay)}",
         )
         if in_position is not None:
             write_moves(report, judged, in_position)
@@ -214,7 +209,7 @@ class Fit:
         with atomic_open_text(files["machine file"]) as file:
             file.write(machine_text(self.machine, comments=self._comments()))
         commands = commands_to_try(self.judged.replay.recordings)
-        write_commands(files["commands to try"], commands, self.machine.T_s, self.machine.unit)
+        write_commands(files["commands to try"], commands, self.machine.T_s, self.logs[0].shown)
         with atomic_open(files["trained predictor"]) as state:
             state.write(self.trained)
         for i, (what, path) in enumerate(archives.items() if fmus else ()):
@@ -331,13 +326,9 @@ def fit(
     ]
     judging = max(len(recording.x) - recording.n_train for recording in recordings)
     if Np is not None and Np > judging:
-        n_pieces = sum(len(log.starts) for log in logs)
-        way = f"a log of {2 * Np} samples or more"
-        if n_pieces > len(logs):
-            way = f"read the log with resample=True (--resample): its times cut it into {n_pieces} pieces"
         raise ParameterError(
             f"Np must be at most {judging}, got {Np}: the first half of each log trains, and the longest stretch for "
-            f"the test has {judging} samples; give a smaller Np, or {way}"
+            f"the test has {judging} samples; give a smaller Np, or {2 * Np} samples or more without a gap"
         )
     default = replace(with_window(PredictorSettings(T_s=T_s), window), **entries)
     default.check_replay()

@@ -18,7 +18,7 @@ from ..base.metrics import rms
 from ..base.settings import PARAMETERS, PredictorSettings
 from ..base.signals import Array
 from ..identify.output_error import in_time
-from ..logs.checks import noise_std, resolution
+from ..logs.checks import noise_std, resolution, starts_in_motion
 from ..logs.units import DisplayUnits
 from ..model.discrete import DiscreteModel
 from ..model.physics import ModalModel, Mode
@@ -133,7 +133,8 @@ def identified_plant(
 def commands_to_try(recordings: Sequence[Recording]) -> Array:
     """Return commands of a log to try with, m: its first 20 000 from where it moves, to rest where it rests.
 
-    They begin where the log began, as stiffness and what is learned of the position count from there.
+    They begin where the log began, as stiffness and what is learned of the position count from there; where that is in
+    motion, with a lead-in from rest to its velocity, by half the largest acceleration of the commands.
     """
     distances = [float(np.abs(np.diff(one.x_d)).sum()) for one in recordings]
     found = recordings[distances.index(max(distances))].x_d
@@ -142,7 +143,14 @@ def commands_to_try(recordings: Sequence[Recording]) -> Array:
     steps = np.abs(np.diff(found))
     at_rest = np.flatnonzero(steps <= _AT_REST * steps.max(initial=0.0)) + 1
     last = int(at_rest[-1]) + 1 if len(at_rest) else 0
-    return found[:last] if last > len(found) // 2 else found
+    found = found[:last] if last > len(found) // 2 else found
+    if not starts_in_motion(found):
+        return found
+    first = found[1] - found[0]
+    n = math.ceil(3.0 * abs(first) / max(float(np.abs(np.diff(found, 2)).max(initial=0.0)), 1e-3 * abs(first)))
+    share = np.arange(n, 0, -1) / n  # of the way to the first sample, backwards
+    steps = first * share**2 * (3.0 - 2.0 * share)
+    return np.concatenate((found[0] - np.cumsum(steps)[::-1], found))
 
 
 def _memory(discrete: DiscreteModel) -> int:

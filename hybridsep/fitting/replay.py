@@ -50,13 +50,13 @@ def split_log(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: i
 
     ``n_settling`` samples after each gap are no test samples, unless fewer than half of the test samples were left.
 
-    SignalError if a part is left without samples.
+    SignalError if the test is left without samples.
     """
     given = list(pieces)
     n = sum(len(x_d) for x_d, _ in given)
     left = round(share * n)
-    if not 0 < left < n:
-        raise SignalError(f"a log of {n} samples has none to train or none to test with a share of {share:g}")
+    if not 0 <= left < n:
+        raise SignalError(f"a log of {n} samples has none to test with a share of {share:g} to train")
     found = []
     for x_d, x in given:
         found.append(Recording(x_d, x, min(left, len(x_d))))

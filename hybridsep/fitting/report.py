@@ -195,13 +195,15 @@ def _write_time(report: Report, judged: Judged) -> None:
     lines += [Line(_NAMES[i], t, errors[i], _COLOURS[i], panel=1) for i in (0, 2)]
     half = np.minimum(1.96 * std, 1.2 * np.nanmax(np.abs(errors)))  # at first it may be far wider than any error
     lines.append(Line("95 % interval of the hybrid", t, -half, HYBRID, upper=half, panel=1))
+    tested = np.cumsum([max(len(one.x) - one.first_judged(replay.Np), 0) for one in replay.recordings])
+    pieces = [piece for line in lines for piece in line.cut(tested[:-1].tolist())]
     how = (
         f"The hybrid states its own standard deviation with each window; {100 * within:.0f} % of the errors are within "
         "its 95 % interval."
     )
     panels = (f"command [{position}]", f"error x − x̂ [{unit}]")
     report.heading("Errors over time")
-    report.chart(Chart(f"time in {judged.part} [s]", panels, lines, how))
+    report.chart(Chart(f"time in {judged.part} [s]", panels, pieces, how))
 
 
 def _write_horizon(report: Report, judged: Judged) -> None:
@@ -288,8 +290,9 @@ def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, S
         report.table([log.path.name, "note"], rows, words=1)
         (factor, unit), positions = log.shown.position, {"commanded": log.x_d, "measured": log.x_meas}
         lines = [
-            Line(name, log.t - log.t[0], factor * x, colour)
+            piece
             for (name, x), colour in zip(positions.items(), (_COMMAND, PHYSICS), strict=True)
+            for piece in Line(name, log.t - log.t[0], factor * x, colour).cut(log.starts[1:])
         ]
         report.chart(Chart("time [s]", (f"position [{unit}]",), lines, "As recorded."))
 

@@ -45,8 +45,8 @@ def choose_columns(
             raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, got {brief(role)}")
     given = dict(columns or {})
     chosen, remarks = _positions(source, given, axis)
-    own = source.times.get(chosen["x_d"] or "")
-    chosen = {"t": own if own and "t" not in given else _name(source, "t", given.get("t")), **chosen}
+    own = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
+    chosen = {"t": own, **chosen}
     if chosen["t"] is None and "t" not in given and time_needed:
         chosen["t"] = _only_clock(source)
     if chosen["t"] is None and "t" not in given and not time_needed:
@@ -93,16 +93,17 @@ def _positions(source: Source, given: Mapping[str, str], axis: str | None) -> tu
         found, remarks = _of_axis(source, axes, axis), list[str]()
         pair: tuple[str | None, str | None] = found
     else:
-        own = {} if source.axes else {role: _name(source, role, None) for role in ("x_d", "x") if role not in given}
+        own = {} if source.axes else {role: _name(source, role, None) for role in ("x_d", "x") if role not in chosen}
+        left = [role for role in ("x_d", "x") if role not in chosen and own.get(role) is None]
         partner = next((pair for pair in axes.values() if set(pair) & set(chosen.values())), None)
         first = source.axis or next(iter(axes), None)
         pair, remarks = (own.get("x_d"), own.get("x")), []
         if partner is not None:
             pair = partner
-        elif first is not None and not given and None in pair:
+        elif first is not None and left and (not chosen or len(axes) == 1):
             pair = axes[first]
         read = next((name for name, one in axes.items() if one == pair), None)
-        if len(axes) > 1 and read is not None and not given:
+        if len(axes) > 1 and read is not None and not chosen:
             remarks = [f"axis {read} of {listed(list(axes), str)} is read; axis='…' (--axis) chooses another"]
     return {"x_d": pair[0], "x": pair[1], **chosen}, remarks
 
@@ -116,6 +117,17 @@ def _of_axis(source: Source, axes: Mapping[str, tuple[str, str]], axis: str) -> 
             return pair
     there = f"there are {listed(list(axes), str)}" if axes else "no names tell axes: name the columns, --x_d and --x"
     raise LogError(f"{source.path}: axis {brief(axis)} is missing; {there}")
+
+
+def _time_of(source: Source, x_d: str) -> str | None:
+    """Return the column of a command's times: its own, that of its struct or one around, or of the file; or None."""
+    if x_d in source.times:
+        return source.times[x_d]
+    for end in sorted((i for i, sign in enumerate(x_d, 1) if sign == "."), reverse=True):
+        beside = {name.removeprefix(x_d[:end]): name for name in source.names if name.startswith(x_d[:end])}
+        if known := known_names("t", list(beside)):
+            return beside[known[0]]
+    return _name(source, "t", None)
 
 
 def _name(source: Source, role: str, given: str | None) -> str | None:
@@ -229,7 +241,7 @@ def channels(source: Source) -> list[_Channel]:
         roles.update((name, role) for role, name in pair.items())
     with suppress(LogError):
         x_d = next((name for name, role in roles.items() if role == "x_d"), None)
-        roles[source.times.get(x_d or "") or _name(source, "t", None) or _only_clock(source)] = "t"
+        roles[_time_of(source, x_d or "") or _only_clock(source)] = "t"
     units = {**source.assumed_units, **source.units}
     return [_Channel(name, units.get(name) or stated_unit(name)[1], roles.get(name, "")) for name in source.names]
 

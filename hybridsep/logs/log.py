@@ -113,10 +113,11 @@ def read_log(
 ) -> Log:
     """Read a log as it was recorded: in the order of the file, every sample. Its units are said here, and nowhere else.
 
-    Measured positions that are missing are NaN. Gaps, and times that go back, begin another segment. What keeps the
-    file's meaning is done, and said in :attr:`Log.remarks`: the wraps of a counter and the whole turns of a rotary axis
-    are unwrapped, rows that repeat the one before, time included, are left out, and of a sensor that is renewed every n
-    samples the samples are taken in which it is new.
+    Measured positions that are missing are NaN. Up to 10 rows that are lost in a row are put back, where the times tell
+    how many they are: the command as the cubic through its neighbours, the measurement missing. Longer gaps, and times
+    that go back, begin another segment. What keeps the file's meaning is done, and said in :attr:`Log.remarks`: the
+    wraps of a counter and the whole turns of a rotary axis are unwrapped, rows that repeat the one before, time
+    included, are left out, and of a sensor that is renewed every n samples the samples are taken in which it is new.
 
     Parameters
     ----------
@@ -185,9 +186,10 @@ def read_log(
     remarks += times.remarks
     for change, wanted in (
         (whole_turns, log.unit == "rad"),
+        (partial(_even, lost=times.lost), times.lost is not None),
         (_at_sensor_phase, True),
         (partial(_shifted, delay=delay), delay != 0),
-        (_resampled, resample),
+        (_even, resample),
     ):
         if wanted:
             log, said = change(log)
@@ -297,10 +299,6 @@ _ONE_PHASE, _CHANGES = 0.95, 50
 """Share of a slow sensor's changes that come in one sample of every n, which no other log of a hundred reached for any
 n, and fewest changes that show it."""
 
-_BRIDGED = 10
-"""Samples missing in a row that get rows of their own on request, a tenth of the default window: a command of 2 m/s² at
-1 kHz is interpolated within 0.3 µm over one of them, 30 µm over ten."""
-
 _UNEVEN = 0.05
 """Relative difference of an interval from the log's from which it counts as uneven: at a feed rate of 80 mm/s and
 1 kHz, 5 % of an interval are 4 µm of travel, comparable to the noise of an encoder."""
@@ -406,28 +404,47 @@ def uneven(t: Array, T_s: float, starts: tuple[int, ...]) -> Indices:
     return np.asarray(np.flatnonzero(deviations > _UNEVEN) + 1)
 
 
-def _resampled(given: Log) -> tuple[Log, str]:
-    """Return the log at even times, linearly between the given ones, with rows of their own in short gaps.
+def _even(given: Log, lost: Indices | None = None) -> tuple[Log, str]:
+    """Return the log with a row for each of those ``lost`` before each sample, (n,); without them at even times.
 
-    The measured position is missing in these, NaN. Of each segment the times begin with its own first one.
+    The command is the cubic through its neighbours, or at times of a clock, which may repeat, linear between them.
     """
-    T_s = given.T_s
-    n_lost = np.round(np.diff(given.t) / T_s)[np.array(given.starts[1:], dtype=np.intp) - 1] - 1.0
-    starts = [0, *(start for start, n in zip(given.starts[1:], n_lost, strict=True) if not 0 < n <= _BRIDGED)]
-    if len(starts) == len(given.starts) and not len(uneven(given.t, T_s, given.starts)):
+    if lost is None and not len(uneven(given.t, given.T_s, given.starts)):
         return given, ""
+    places = given.t / given.T_s if lost is None else np.arange(float(len(lost))) + np.cumsum(lost)
     parts = []
-    for part in replace(given, starts=tuple(starts)).segments():
-        n = int((part.t[-1] - part.t[0]) / T_s + 1e-6) + 1
-        t = part.t[0] + T_s * np.arange(n)
-        x_d, x_meas, *signals = (np.interp(t, part.t, x) for x in (part.x_d, part.x_meas, *part.signals.values()))
-        after = np.clip(np.searchsorted(part.t, t), 1, len(part.t) - 1)
-        apart = np.minimum(np.abs(part.t[after] - t), np.abs(t - part.t[after - 1]))
-        x_meas[apart > T_s / 2] = np.nan
+    for part, own in zip(given.segments(), np.split(places, given.starts[1:]), strict=True):
+        rows = own - own[0]
+        at = np.arange(int(rows[-1] + 1e-6) + 1)
+        x_d = np.interp(at, rows, part.x_d) if lost is None else _cubic(rows, part.x_d, at)
+        x_meas, *signals = (_between(rows, x, at) for x in (part.x_meas, *part.signals.values()))
         taken = dict(zip(part.signals, signals, strict=True))
-        parts.append(replace(part, t=t, x_d=x_d, x_meas=x_meas, signals=taken))
-    said = f"taken at even times, {T_s:g} s apart, linearly between samples; gaps of up to {_BRIDGED} have rows"
-    return _joined(parts), f"{said} without measurement (--resample)"
+        parts.append(replace(part, t=np.interp(at, rows, part.t), x_d=x_d, x_meas=x_meas, signals=taken))
+    said = f"taken at even times, {given.T_s:g} s apart, linearly between samples (--resample)"
+    return _joined(parts), said if lost is None else ""
+
+
+def _cubic(rows: Array, x: Array, at: Indices) -> Array:
+    """Return a signal between its samples: Newton's polynomial through the two on either side, at an end the next."""
+    n = min(4, len(rows))
+    near = np.clip(np.searchsorted(rows, at) - 2, 0, len(rows) - n)[:, None] + np.arange(n)
+    order = np.argsort(np.abs(rows[near] - at[:, None]), axis=1)  # exact at a sample, which is the first then
+    near = np.take_along_axis(near, order, axis=1)
+    places, differences, found = rows[near], x[near], np.zeros(len(at))
+    for k in range(1, n):
+        differences[:, k:] = np.diff(differences[:, k - 1 :]) / (places[:, k:] - places[:, :-k])
+    for k in reversed(range(n)):
+        found = differences[:, k] + (at - places[:, k]) * found
+    return found
+
+
+def _between(rows: Array, x: Array, at: Indices) -> Array:
+    """Return a signal linearly between its known samples, NaN over half a row from the nearest one."""
+    rows, x = rows[np.isfinite(x)], x[np.isfinite(x)]
+    if not len(rows):
+        return np.full(len(at), np.nan)
+    nearest = rows[np.searchsorted((rows[1:] + rows[:-1]) / 2, at)]
+    return np.where(np.abs(nearest - at) > 0.5, np.nan, np.interp(at, rows, x))
 
 
 def _joined(parts: list[Log]) -> Log:

@@ -18,23 +18,25 @@ planned, that which enters the position loop, later and interpolated, the measur
 its deviation from the contour."""
 
 _NAMES: Mapping[str, tuple[str, ...]] = {
-    "t": ("t", "time", "timestamp", "time_stamp", "zeit"),
+    "t": ("t", "time", "timestamp", "time_stamp", "sec", "seconds", "zeit"),
     "x_d": (
         "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "set_point", "command",
         "commanded", "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "ctrl_pos",
-        "des_pos", "q_d", "sollposition", "lagesollwert",
+        "des_pos", "q_d", "sollposition", "solllage", "lagesollwert",
     ),
     "x": (
         "x_meas", "x", "x_m", "x_act", "measured", "measurement", "actual", "position_measured", "measured_position",
         "actual_position", "position_actual", "pos_meas", "pos_act", "act_pos", "enc_pos", "feedback", "q_meas",
-        "process_value", "istposition", "lageistwert",
+        "process_value", "istposition", "istlage", "lageistwert",
     ),
 }  # fmt: skip
 """Names of each role's column, by precedence, in small letters; where the true position is x, x_meas is meant."""
 
+_SOLL, _IST = {"sollposition", "solllage", "lagesollwert"}, {"istposition", "istlage", "lageistwert"}
 _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "des", "desired", "target"}
-_MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder"}
-_POSITION = {"pos", "position", "positions"}
+_COMMANDED |= {"soll", *_SOLL}
+_MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "ist"} | _IST
+_POSITION = {"pos", "position", "positions", "lage"} | _SOLL | _IST
 """Words within names, in small letters; what is left of a name beside them and the word axis is the axis."""
 
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|\W")

@@ -25,6 +25,14 @@ _GAP, _LATE, _AROUND = 1.5, 0.6, 9
 """Interval, in sampling intervals, from which samples are missing, or by which, less one, a clock was set back; how
 much later or earlier the times must stay then, and over how many samples: jitter does not last."""
 
+_BRIDGED = 10
+"""Rows lost in a row that are put back, a tenth of the default window: of five commands of 0.2 to 1 kHz the cubic
+through the neighbours missed ten rows by 0.4 to 6 % of what a line does, one by 0.2 to 5 %."""
+
+_WHOLE, _JITTER, _WHOLE_MAX = 0.05, 4.0, 0.35
+"""Difference, in intervals, of a gap from whole rows with which the times tell how many are lost: of even times, by how
+many times their usual jitter it is larger, and its most."""
+
 _TOLERANCE = 0.01  # largest relative difference of a given interval from that of the times: more than a clock's drift
 
 _ROUNDING, _ERRORS, _ROUNDING_MAX = 1e-8, 3.0, 1e-4
@@ -38,7 +46,8 @@ class Times:
     t: Array  # (n,), s
     T_s: float  # sampling interval, s
     starts: tuple[int, ...] = (0,)  # first samples of the segments; the first is 0
-    remarks: tuple[str, ...] = ()  # what was unwrapped, and why segments begin
+    remarks: tuple[str, ...] = ()  # what was unwrapped, what is missing, and why segments begin
+    lost: Indices | None = None  # (n,): rows lost before each sample, in short gaps within segments; None without any
 
 
 @np.errstate(over="ignore", invalid="ignore")  # times may be any finite numbers
@@ -77,8 +86,10 @@ def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated
             f"{path}: T_s = {given:g} s was given, but column {brief(name)} has an interval of {interval:g} s; leave "
             "T_s out, or correct it or the column"
         )
-    starts = _starts(t, interval)
-    return Times(t, T_s, (0, *starts.tolist()), (*remarks, *_words(t, starts, T_s)))
+    gaps, lost = _gaps(t, interval)
+    starts = gaps[lost[gaps] == 0]
+    words = (*_words(t, np.flatnonzero(lost), T_s, _PUT_BACK), *_words(t, starts, T_s))
+    return Times(t, T_s, (0, *starts.tolist()), (*remarks, *words), lost if lost.any() else None)
 
 
 def _unwrapped(t: Array) -> tuple[Array, tuple[str, ...]]:
@@ -150,17 +161,20 @@ def _is_one_of(ratio: float, *known: float) -> bool:
     return any(abs(ratio / one - 1.0) <= _TOLERANCE for one in known)
 
 
-def _words(t: Array, starts: Indices, T_s: float) -> list[str]:
-    """Return why segments begin."""
-    steps = np.diff(t)[starts - 1]
-    gaps, back, said = starts[steps > 0.0], starts[steps <= 0.0], []
+_PUT_BACK = "the command is the cubic through its neighbours there, the measurement missing"
+
+
+def _words(t: Array, at: Indices, T_s: float, what: str = "another segment begins after each") -> list[str]:
+    """Return what is missing before samples, and what is done there."""
+    steps = np.diff(t)[at - 1]
+    gaps, back, said = at[steps > 0.0], at[steps <= 0.0], []
     if len(gaps):
         lost = np.round(steps[steps > 0.0] / T_s) - 1.0
         longest = float(steps[steps > 0.0].max())
         said.append(
             f"{lost.sum():.6g} sample{'s are' if lost.sum() > 1 else ' is'} missing in {len(gaps)} "
             f"gap{'s' if len(gaps) > 1 else ''}, the longest of {longest:.4g} s; the first is before sample "
-            f"{gaps[0] + 1}: another segment begins after each (--resample: short ones get rows without measurement)"
+            f"{gaps[0] + 1}: {what}"
         )
     if len(back):
         said.append(
@@ -170,38 +184,52 @@ def _words(t: Array, starts: Indices, T_s: float) -> list[str]:
     return said
 
 
-def _starts(t: Array, T_s: float) -> Indices:
-    """Return the samples that are later than the one before by over an interval, or earlier, and all after them."""
+def _gaps(t: Array, T_s: float) -> tuple[Indices, Indices]:
+    """Return the samples that are later than the one before by over an interval, or earlier, and all after them.
+
+    And the rows that are lost before every sample: none where times do not tell how many, or these are too many.
+    """
     steps = np.diff(t) / T_s
     at = np.flatnonzero((steps > _GAP) | (steps < 1.0 - _GAP)) + 1
-    phase, found = np.append(0.0, np.cumsum(steps - 1.0)), at[:0]
+    found = at[:0]
     while len(at):
-        around = sliding_window_view(np.pad(phase, _AROUND, constant_values=np.nan), _AROUND)
-        # Window i ends before sample i, window i + _AROUND begins with it
-        late = np.nanmedian(around[at + _AROUND], axis=1) - np.nanmedian(around[at], axis=1)
+        late = _late(steps, at, found)
         is_start = (np.abs(late) > _LATE) & (late * steps[at - 1] > 0.0)
         if not is_start.any():
             break
         # Once more without these, which may hide one a few samples beside
-        jumps = np.zeros(len(t))
-        jumps[at[is_start]] = steps[at[is_start] - 1] - 1.0
-        phase, found, at = phase - np.cumsum(jumps), np.union1d(found, at[is_start]), at[~is_start]
-    return found
+        found, at = np.union1d(found, at[is_start]), at[~is_start]
+    late = steps[found - 1] - 1.0 + _late(steps, found, found)
+    lost, rows = np.zeros(len(t), dtype=np.intp), np.round(late)
+    whole = min(_WHOLE + _JITTER * float(np.median(np.abs(steps - 1.0))), _WHOLE_MAX)
+    lost[found] = np.where((np.abs(late - rows) <= whole) & (rows > 0.0) & (rows <= _BRIDGED), rows, 0.0)
+    return found, lost
+
+
+def _late(steps: Array, at: Indices, known: Indices) -> Array:
+    """Return how many intervals later the times from samples on are than those before, ``known`` jumps left out."""
+    jumps = np.zeros(len(steps))
+    jumps[known - 1] = steps[known - 1] - 1.0
+    phase = np.append(0.0, np.cumsum(steps - 1.0 - jumps))
+    around = sliding_window_view(np.pad(phase, _AROUND, constant_values=np.nan), _AROUND)
+    # Window i ends before sample i, window i + _AROUND begins with it
+    return np.asarray(np.nanmedian(around[at + _AROUND], axis=1) - np.nanmedian(around[at], axis=1))
 
 
 def _mean_interval(t: Array) -> tuple[float, float]:
     """Return the mean interval, segments apart, and its relative standard error if times scatter independently."""
     steps = np.diff(t)
     interval = float(np.median(steps[steps > 0.0]))
-    inner = np.ones(len(steps), dtype=np.bool_)
     for _ in range(2):  # once more with the mean, as jitter moves a median
-        inner[:] = True
-        inner[_starts(t, interval) - 1] = False
-        if inner.any() and steps[inner].sum() > 0.0:
-            interval = float(steps[inner].sum() / inner.sum())
+        gaps, lost = _gaps(t, interval)
+        rows = lost[1:] + 1.0  # in each step, none between segments
+        rows[gaps[lost[gaps] == 0] - 1] = 0.0
+        if steps[rows > 0.0].sum() > 0.0:
+            interval = float(steps[rows > 0.0].sum() / rows.sum())
+    inner = rows > 0.0
     n_pieces = len(steps) - int(inner.sum()) + 1
-    deviation = float(np.std(steps[inner] / interval)) if inner.any() else 0.0
-    return interval, deviation * math.sqrt(n_pieces) / max(int(inner.sum()), 1)  # only the ends of the pieces count
+    deviation = float(np.std(steps[inner] / interval - rows[inner])) if inner.any() else 0.0
+    return interval, deviation * math.sqrt(n_pieces) / max(rows.sum(), 1.0)  # only the ends of the pieces count
 
 
 def _rounded(mean: float, tolerance: float) -> float:

@@ -33,6 +33,9 @@ def test_gaps_and_jitter_are_noted(hybridsep: Run, tmp_path: Path) -> None:
     assert "intervals differ from 0.0009998 s, by up to " in err
     assert json.loads(out)["n_samples"] == 2940
     assert json.loads(out)["n_batches"] == 9 + 21  # each segment has windows of its own
+    assert json.loads(out)["judged"]["n_windows"] == 9 + 20 - 1  # whole ones, but the one after the gap
+    assert "the whole log is the test" in page.read_text(encoding="utf-8")
+    assert "The window after a gap is no test window" in page.read_text(encoding="utf-8")
     assert [finding["name"] for finding in json.loads(out)["findings"]] == ["rate"]
 
 

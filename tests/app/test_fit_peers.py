@@ -98,6 +98,9 @@ def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_pa
     judged = json.loads((tmp_path / "fit" / "fit.json").read_text())["judged"]
     assert judged["rms_h"] < 3e-3  # rad
     assert f"{np.degrees(1e3 * judged['rms_h']):.2f}" in words
+    tried = hybridsep.done("cosim", "-m", tmp_path / "fit" / "machine.toml")
+    assert re.search(r"error\s+in\s+m?deg", tried)
+    assert "x_d [deg]" in (tmp_path / "fit" / "commands.csv").read_text()
 
 
 def test_missing_measurements_are_not_used_of_a_log(tmp_path: Path) -> None:

@@ -60,8 +60,8 @@ def test_tracking_and_paths_hide_and_cut_nothing(tmp_path: Path) -> None:
 
 def test_a_rotary_axis_is_shown_in_angles(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = made_run(COMPENSATOR, 300)
-    print_run(run, False, "Table", "rad")
-    print_run(made_run(PREDICTOR, 300), False, "Table", "rad")
+    print_run(run, False, "Table", "rad", shown_in("rad"))
+    print_run(made_run(PREDICTOR, 300), False, "Table", "rad", shown_in("rad"))
     said = capsys.readouterr().out
     assert "RMS [µrad]" in said
     assert re.search(r"at most 60\.0 mrad/s, \S+ rad/s², \S+ rad/s³", said)

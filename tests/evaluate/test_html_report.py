@@ -86,6 +86,17 @@ def test_of_a_long_line_the_extremes_are_drawn() -> None:
     assert np.nanmax(figure.data[0].y) == 7.0
 
 
+def test_a_line_is_cut_where_a_gap_is() -> None:
+    """It was drawn across, and a command seemed to jump; the legend has it once."""
+    t = np.arange(9000.0)
+    lines = [Line("y", t, t, "#123456"), Line("band", t, -t, "#010203", upper=t)]
+    pieces = [piece for line in lines for piece in line.cut([5000, 8000, 8000])]
+    figure = Chart("t [s]", ("y",), pieces).figure()
+    assert [one.showlegend for one in figure.data] == [True, False, False, True, False, False]
+    assert [(min(one.x), max(one.x)) for one in figure.data[:3]] == [(0, 4999), (5000, 7999), (8000, 8999)]
+    assert [one.legendgroup for one in figure.data] == ["y"] * 3 + ["band"] * 3
+
+
 def test_a_band_with_a_gap_is_one_outline_a_stretch() -> None:
     upper = np.array([1.0, 1.0, np.nan, 1.0])
     (band,) = Chart("f [Hz]", ("γ²",), [Line("band", [1, 2, 3, 4], -upper, "#010203", upper=upper)]).figure().data

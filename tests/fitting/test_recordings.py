@@ -49,9 +49,9 @@ def test_what_is_tried_of_a_long_log_is_its_beginning_to_where_it_rests() -> Non
     np.testing.assert_array_equal(one.x_d, x_d[:86])
 
 
-@pytest.mark.parametrize("share", [0.0, 1.0, 1e-9])
+@pytest.mark.parametrize("share", [-0.1, 1.0])
 def test_a_part_without_samples_is_refused(share: float) -> None:
-    with pytest.raises(SignalError, match="none to train or none to test"):
+    with pytest.raises(SignalError, match="none to test"):
         split_log(pieces(N), share)
 
 

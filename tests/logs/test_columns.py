@@ -79,8 +79,31 @@ def test_a_time_beside_each_channel(tmp_path: Path) -> None:
     assert read_log(path).T_s == 1.0
 
 
-def test_a_german_log(tmp_path: Path) -> None:
-    text = "Zeit [ms];Sollposition [mm];Istposition [mm]\n0;1,5;1\n2;2;1,5\n"
+@pytest.mark.parametrize("name", ["trace.t", "trace.time [s]", "t", "tick"])
+def test_columns_in_a_struct_are_guessed_beside_those_that_are_named(tmp_path: Path, name: str) -> None:
+    """A time that was named kept the positions from being found; ``trace.t`` was no time."""
+    data = columns()
+    text = {name: data["t"], "trace.pos.set_mm": data["x_d"], "trace.pos.act_mm": data["x"], "trace.iq": data["x"]}
+    path = write(tmp_path / "log.csv", text)
+    log = read_log(path, columns={"t": name} if name == "tick" else None)
+    np.testing.assert_allclose((log.t, log.x_d, log.x_meas), (data["t"], 1e-3 * data["x_d"], 1e-3 * data["x"]))
+    for role, other in (("x_d", "trace.iq"), ("x", "trace.iq"), ("x_d", "trace.pos.set_mm")):
+        named = read_log(path, columns={role: other, **({"t": name} if name == "tick" else {})}, unit="mm")
+        left = {"x_d": ("trace.pos.act_mm", 1), "x": ("trace.pos.set_mm", 0)}[role]
+        assert named.columns[left[1]] == left[0]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "Sollposition [mm];Istposition [mm]",
+        "Solllage [mm];Istlage [mm]",
+        "X_SollPos [mm];X_IstPos [mm]",
+        "Lagesollwert Achse X [mm];Lageistwert Achse X [mm]",
+    ],
+)
+def test_a_german_log(tmp_path: Path, names: str) -> None:
+    text = f"Zeit [ms];{names}\n0;1,5;1\n2;2;1,5\n"
     log = read_log(write_csv(tmp_path / "log.csv", text))
     np.testing.assert_allclose((*log.t, *log.x_d, *log.x_meas), (0, 2e-3, 1.5e-3, 2e-3, 1e-3, 1.5e-3))
 

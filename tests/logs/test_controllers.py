@@ -199,7 +199,14 @@ def test_a_faster_measurement_is_interpolated(tmp_path: Path) -> None:
     np.testing.assert_allclose(log.x_meas, np.interp(T[2:100:2], late, X), rtol=1e-12)
 
 
-def test_gaps_are_not_bridged(tmp_path: Path) -> None:
+def test_rows_that_twincat_lost_are_put_back(tmp_path: Path) -> None:
+    keep = np.delete(np.arange(400), range(100, 110))
+    log = read_log(with_times(tmp_path / "log", T[keep], X_D[keep], T[keep], X[keep]))
+    assert (log.starts, np.flatnonzero(np.isnan(log.x_meas)).tolist()) == ((0,), list(range(100, 110)))
+    np.testing.assert_allclose(log.t, T, atol=1e-12)
+
+
+def test_gaps_of_one_channel_are_not_bridged(tmp_path: Path) -> None:
     fast = np.delete(np.arange(400), range(100, 110))
     path = with_times(tmp_path / "log", T[fast], X_D[fast], T[::2], X[::2])
     with pytest.raises(LogError, match=r"column 'x_d' has a gap of 0\.011 at time 0\.1 and cannot be resampled"):

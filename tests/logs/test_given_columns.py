@@ -145,6 +145,11 @@ def test_gaps_in_the_labels_are_gaps(step: int) -> None:
     log = read_log(without(GONE, step * np.arange(N) + 7), T_s=1e-3)
     assert (log.T_s, log.starts, len(log.t)) == (1e-3, (0, 1000), N - 100)
     assert "100 samples are missing in 1 gap" in log.remarks[-1]
+    few = (np.arange(N) >= 1000) & (np.arange(N) < 1007)
+    log = read_log(without(few, step * np.arange(N) + 7), T_s=1e-3)
+    in_place = read_log({"x_d": X_D, "x": np.where(few, math.nan, X)}, T_s=1e-3)
+    np.testing.assert_allclose(log.x_d, in_place.x_d, atol=1e-6)
+    np.testing.assert_array_equal(log.x_meas, in_place.x_meas)
     assert read_log(Frame(Labelled(np.arange(N) + 7), x_d=X_D, x=X), T_s=1e-3).starts == (0,)
     joined = np.r_[0:1500, 0:1500]
     assert read_log(Frame(Labelled(joined), x_d=X_D, x=X), T_s=1e-3).starts == (0, 1500)

@@ -307,19 +307,55 @@ def test_the_measured_position_is_shifted_by_an_option(tmp_path: Path) -> None:
         read(tmp_path, t, delay=600)
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat", ".json", ".parquet"])
+def test_a_few_rows_that_are_lost_are_put_back(tmp_path: Path, suffix: str) -> None:
+    """They cut a log, and the run began again after each: a log without one row in 9000 was predicted half as well."""
+    data, put_back = columns(200), [1, 40, 41, *range(90, 100)]
+    keep = np.delete(np.arange(200), [*put_back, *range(150, 161)])
+    log = read_log(write(tmp_path / f"log{suffix}", {name: values[keep] for name, values in data.items()}))
+    there = np.r_[0:150, 161:200]
+    assert (log.starts, log.n_recorded) == ((0, 150), len(keep))
+    np.testing.assert_allclose(log.t, data["t"][there], atol=1e-12)
+    np.testing.assert_allclose(log.x_d, data["x_d"][there], atol=1e-9)  # a line is 15 µm away
+    np.testing.assert_allclose(log.x_meas, np.where(np.isin(there, put_back), np.nan, data["x"][there]))
+    short, long = (remark for remark in log.remarks if "missing" in remark)
+    assert short == (
+        "13 samples are missing in 3 gaps, the longest of 0.011 s; the first is before sample 2: the command is the "
+        "cubic through its neighbours there, the measurement missing"
+    )
+    assert long.startswith("11 samples are missing in 1 gap, ")
+    assert long.endswith(": another segment begins after each")
+
+
+def test_where_a_command_rests_it_rests_in_rows_that_were_lost(tmp_path: Path) -> None:
+    keep = np.delete(np.arange(N), [1, 3, 100, 597, 598])
+    path = write(tmp_path / "log.npz", {"t": 1e-3 * keep, "x_d": np.full(len(keep), 0.1), "x": X[keep]})
+    assert (read_log(path).x_d == 0.1).all()
+
+
+def test_how_many_rows_are_lost_must_be_told(tmp_path: Path) -> None:
+    """By a clock that jitters as well; but half a row is none, and another segment begins."""
+    keep = np.delete(np.arange(N), np.arange(50, 550, 20))
+    jitter = np.random.default_rng(0).uniform(-2e-4, 2e-4, len(keep))
+    path = write(tmp_path / "log.npz", {"t": 1e-3 * keep + jitter, "x_d": X_D[keep], "x": X[keep]})
+    log = read_log(path)
+    assert (log.starts, len(log.t), np.isnan(log.x_meas).sum()) == ((0,), N, 25)
+    t = 1e-3 * np.arange(N)
+    t[300:] += 1.2e-3
+    assert read(tmp_path, t).starts == (0, 300)
+
+
 def test_resampled_by_an_option(tmp_path: Path) -> None:
     t = 1e-3 * np.arange(N)
-    keep = np.delete(np.arange(N), [100, 200, 201, *range(300, 350)])
-    path = write(tmp_path / "log.npz", {"t": t[keep], "x_d": X_D[keep], "x": X[keep]})
-    assert read_log(path).starts == (0, 100, 199, 297)
+    keep = np.delete(np.arange(N), [100, 200, 201])
+    uneven = t + 2e-4 * np.sin(np.arange(N))
+    path = write(tmp_path / "log.npz", {"t": uneven[keep], "x_d": X_D[keep], "x": X[keep]})
     log = read_log(path, resample=True)
-    assert log.starts == (0, 300)
-    assert np.flatnonzero(np.isnan(log.x_meas)).tolist() == [100, 200, 201]
-    known = np.isfinite(log.x_meas)
-    np.testing.assert_allclose(log.x_d[known], X_D[keep], atol=1e-12)
-    uneven = read(tmp_path, t + 2e-4 * np.sin(np.arange(N)), resample=True)
-    np.testing.assert_allclose(np.diff(uneven.t), uneven.T_s)
-    np.testing.assert_allclose(np.interp(uneven.t, t + 2e-4 * np.sin(np.arange(N)), X), uneven.x_meas, atol=1e-12)
+    missing = np.flatnonzero(np.isnan(log.x_meas))
+    assert (log.starts, missing.tolist()) == ((0,), [100, 200, 201])
+    log = read(tmp_path, uneven, resample=True)
+    np.testing.assert_allclose(np.diff(log.t), log.T_s)
+    np.testing.assert_allclose(np.interp(log.t, uneven, X), log.x_meas, atol=1e-12)
     assert read(tmp_path, t, resample=True).remarks == ()
 
 
