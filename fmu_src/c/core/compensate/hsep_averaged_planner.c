@@ -75,19 +75,13 @@ static void averaged_planner_predict(
     }
 }
 
-/* Commands of a plan, and its first samples; and then half of all, or what is left. */
-static void averaged_planner_begin_to_predict(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
-{
-    self->samples = 0;
-    averaged_planner_predict(self, task, c, (self->late + self->preview) / HSEP_AVERAGED_AT_FIRST, 0);
-}
-
-static void averaged_planner_predict_half(
+/* Predict the next part of all samples: the commands of a plan and the first ones, and then half of all each time. */
+static void averaged_planner_predict_part(
     hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
 {
     const hsep_int all = self->late + self->preview, left = all - self->samples;
-    averaged_planner_predict(self, task, c, left < all / 2 ? left : all / 2, 0);
+    const hsep_int most = self->samples == 0 ? all / HSEP_AVERAGED_AT_FIRST : all / 2;
+    averaged_planner_predict(self, task, c, left < most ? left : most, 0);
 }
 
 /* Cost of the plan that was predicted last, m2; not finite if the prediction overflows. */
@@ -274,18 +268,17 @@ static hsep_int averaged_planner_steps(const hsep_averaged_planner *self, hsep_i
     return step == 0 && self->n_steps > 1 ? HSEP_NEWTON_FIRST_STEPS : averaged_planner_tolerance.steps;
 }
 
-/* Begin to solve a programme in so many steps, of the physics model's plan or of the Newton step; return whether it has
- * a plan. */
-static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int steps)
+/* Do a part of the solution of a programme in so many steps: its factor with what its bounds allow, then its solver's. */
+static void averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int steps)
 {
     hsep_tolerance tolerance = averaged_planner_tolerance;
     tolerance.steps = steps;
 #ifdef HSEP_FLOAT32
     tolerance.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
 #endif
-    const hsep_plan_status status = hsep_planner_solve(task->planner, &tolerance);
-    self->solving = status == HSEP_PLAN_BOUNDED;
-    return status != HSEP_PLAN_FAILED;
+    self->status = self->status == HSEP_PLAN_OPEN        ? hsep_planner_solve(task->planner, &tolerance)
+                   : hsep_planner_advance(task->planner) ? HSEP_PLAN_DONE
+                                                         : HSEP_PLAN_BOUNDED;
 }
 
 /* Judge a length of a step, whose end the planner has, and take it if it is better; otherwise a shorter one is tried.
@@ -346,25 +339,23 @@ static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_ave
 
 /* Multiply-adds of the parts of a plan, counted from the sizes. */
 typedef struct {
-    hsep_real begun;     /* what the sample has cost that begins the window */
     hsep_real number;    /* one of every sample of the plan */
     hsep_real commands;  /* commands of a plan, and their disturbances */
     hsep_real sample;    /* a sample of its prediction, with its variance, */
     hsep_real row;       /* and a row of features for variances */
     hsep_real predict;   /* half of a prediction without variances, and of its cost */
     hsep_real linearise; /* slopes of the disturbances, and gains with them */
-    hsep_real pairs;     /* one of every pair of splines that are solved for, */
-    hsep_real factor;    /* the factor of a programme, */
-    hsep_real solve;     /* its bounds, and whether they allow its minimum, */
+    hsep_real open;      /* a programme that is not of a Newton step, */
+    hsep_real solve;     /* the factor of one, its bounds, and whether they allow its minimum, */
     hsep_real step;      /* and a part of a solver's step */
 } averaged_planner_work;
 
 static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
+    const hsep_physics *physics = hsep_part_const(self, self->physics);
     const hsep_real all = (hsep_real)(self->preview + self->late);
-    const hsep_real n = (hsep_real)(self->ends ? task->planner->knots.n : self->m);
-    averaged_planner_work work = {.number = HSEP_WORK_NUMBER * (hsep_real)self->preview, .pairs = n * n};
+    const hsep_real n = (hsep_real)(self->ends ? task->planner->knots.n : self->m), pairs = n * n;
+    averaged_planner_work work = {.number = HSEP_WORK_NUMBER * (hsep_real)self->preview};
     hsep_real run = HSEP_N_EXPERTS * HSEP_WORK_NUMBER; /* the stack */
     work.sample = run;
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
@@ -379,13 +370,12 @@ static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planne
     /* tanh counts as two; change, command, x_pb, velocity, two of the position; what is filtered */
     work.commands = all * HSEP_WORK_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
                     all * HSEP_WORK_MODE * (hsep_real)physics->n_modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
-    /* with what is learned at the end of the last window, as much as commands of a plan */
-    work.begun = 3.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
     work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
     work.linearise = all * HSEP_WORK_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 14.0);
-    work.factor = work.pairs * (n / 6.0 + 1.5);
-    work.solve = 5.0 * HSEP_ORDERS * work.number + 2.0 * work.pairs; /* row, bound, slack, multiplier of each order */
-    work.step = (10.0 * HSEP_ORDERS * work.number + work.pairs * (n / 6.0 + 3.0)) / HSEP_INTERIOR_PARTS;
+    work.open = 20.0 * work.number + 5.0 * pairs;
+    /* row, bound, slack, multiplier of each order */
+    work.solve = 5.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.5);
+    work.step = (10.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.0)) / HSEP_INTERIOR_PARTS;
     return work;
 }
 
@@ -431,23 +421,23 @@ static hsep_real averaged_planner_left(
     const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
     hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
     left += hsep_planner_carrying(task->planner);
-    if (self->judges) {
-        left += 2.0 * work->predict; /* of the physics model's plan */
+    left += self->judges ? 2.0 * work->predict : 0.0; /* of the physics model's plan */
+    if (self->place > 0) {
+        return left;
     }
-    if (self->place == 0 && self->judges) {
+    if (self->judges) {
         left += (hsep_real)(window - first + behind) * work->sample +
                 (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
     }
-    const hsep_real programme = 20.0 * work->number + 5.0 * work->pairs + work->factor + work->solve;
-    if (self->place == 0 && self->planned) {
-        left += programme + (hsep_real)averaged_planner_physics_steps(self) * parts;
+    if (self->planned) {
+        left += work->open + work->solve + (hsep_real)averaged_planner_physics_steps(self) * parts;
     }
-    if (self->place == 0 && self->ends) {
-        left += programme + 2.0 * work->predict + (hsep_real)averaged_planner_tolerance.steps * parts;
+    if (self->ends) {
+        left += work->open + work->solve + 2.0 * work->predict + (hsep_real)averaged_planner_tolerance.steps * parts;
     }
-    if (self->place == 0 && self->follows) {
-        hsep_real newton = work->linearise + averaged_planner_of_products(self, 0, self->m) + work->factor +
-                           work->solve + 3.0 * work->predict; /* one length of it is enough nearly always */
+    if (self->follows) {
+        hsep_real newton = work->linearise + averaged_planner_of_products(self, 0, self->m) + work->solve +
+                           3.0 * work->predict; /* one length of it is enough nearly always */
         for (hsep_int i = 0; i < self->m; i += averaged_planner_together(task->planner, i)) {
             newton += averaged_planner_of_columns(self, task, work, i);
         }
@@ -469,6 +459,20 @@ static hsep_real averaged_planner_left(
     case (where):; \
     } while (0)
 
+/* Predict all samples under a plan. */
+#define AVERAGED_PLANNER_PREDICT(where, c) \
+    for (self->samples = 0; self->samples < all;) { \
+        AVERAGED_PLANNER_YIELD(where, self->samples == 0 ? work.predict : 0.5 * work.predict); \
+        averaged_planner_predict_part(self, task, c); \
+    }
+
+/* Solve a programme in so many steps of its solver. */
+#define AVERAGED_PLANNER_SOLVE(where, steps) \
+    for (self->status = HSEP_PLAN_OPEN; self->status >= HSEP_PLAN_BOUNDED;) { \
+        AVERAGED_PLANNER_YIELD(where, self->status == HSEP_PLAN_OPEN ? work.solve : work.step); \
+        averaged_planner_solve(self, task, steps); \
+    }
+
 /* Make a plan, from one yield to the next. */
 static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
@@ -480,9 +484,6 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
     switch (self->place) {
     case 0:
-        self->left = work.begun + averaged_planner_left(self, task, &work);
-        AVERAGED_PLANNER_YIELD(18, work.begun);
-
         /* The remainder of the last plan, with the variances of all plans */
         while (self->judges && self->samples < all) {
             AVERAGED_PLANNER_YIELD(1, averaged_planner_vary(self, task, &work, NULL));
@@ -494,18 +495,10 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            AVERAGED_PLANNER_YIELD(2, 20.0 * work.number + 5.0 * work.pairs);
+            AVERAGED_PLANNER_YIELD(2, work.open);
             averaged_planner_open(self, task);
-            AVERAGED_PLANNER_YIELD(4, work.factor);
-            self->planned = (hsep_int)hsep_planner_factor(planner);
-        }
-        if (self->planned) {
-            AVERAGED_PLANNER_YIELD(5, work.solve);
-            self->planned = (hsep_int)averaged_planner_solve(self, task, averaged_planner_physics_steps(self));
-            while (self->solving) {
-                AVERAGED_PLANNER_YIELD(6, work.step);
-                self->solving = !hsep_planner_advance(planner);
-            }
+            AVERAGED_PLANNER_SOLVE(3, averaged_planner_physics_steps(self))
+            self->planned = self->status == HSEP_PLAN_DONE;
         }
         averaged_planner_copy(self, of_physics, c);
         self->judges = self->judges && self->planned;
@@ -515,26 +508,13 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         self->cost_of_rest = self->cost;
         if (self->ends) {
             averaged_planner_copy(self, c, rest);
-            AVERAGED_PLANNER_YIELD(20, 15.0 * work.number + 4.0 * work.pairs);
+            AVERAGED_PLANNER_YIELD(4, work.open);
             hsep_planner_end(planner, task->x_d);
-            AVERAGED_PLANNER_YIELD(21, work.factor);
-            if (hsep_planner_factor(planner)) {
-                AVERAGED_PLANNER_YIELD(22, work.solve);
-                (void)averaged_planner_solve(self, task, averaged_planner_tolerance.steps);
-                while (self->solving) {
-                    AVERAGED_PLANNER_YIELD(23, work.step);
-                    self->solving = !hsep_planner_advance(planner);
-                }
-            }
+            AVERAGED_PLANNER_SOLVE(5, averaged_planner_tolerance.steps)
             averaged_planner_copy(self, rest, c);
         }
         if (self->ends && self->judges) {
-            AVERAGED_PLANNER_YIELD(24, work.predict);
-            averaged_planner_begin_to_predict(self, task, rest);
-            while (self->samples < all) {
-                AVERAGED_PLANNER_YIELD(25, 0.5 * work.predict);
-                averaged_planner_predict_half(self, task, rest);
-            }
+            AVERAGED_PLANNER_PREDICT(6, rest)
             self->cost_of_rest = averaged_planner_cost(self, task, rest);
         }
 
@@ -560,27 +540,14 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
                     9, averaged_planner_of_products(self, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
                 averaged_planner_products(self, planner);
             }
-            AVERAGED_PLANNER_YIELD(10, work.factor);
             hsep_planner_complete(planner, planner->jerk_weight);
-            if (!hsep_planner_factor(planner)) {
+            AVERAGED_PLANNER_SOLVE(10, averaged_planner_steps(self, self->steps))
+            if (self->status == HSEP_PLAN_FAILED) {
                 break;
             }
-            AVERAGED_PLANNER_YIELD(11, work.solve);
-            if (!averaged_planner_solve(self, task, averaged_planner_steps(self, self->steps))) {
-                break;
-            }
-            while (self->solving) {
-                AVERAGED_PLANNER_YIELD(12, work.step);
-                self->solving = !hsep_planner_advance(planner);
-            }
-            memcpy(hsep_at(self, self->found), hsep_planner_found(planner), (size_t)self->m * sizeof(hsep_real));
+            memcpy(hsep_at(self, self->found), hsep_planner_problem(planner).x, (size_t)self->m * sizeof(hsep_real));
             for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
-                AVERAGED_PLANNER_YIELD(13, work.predict);
-                averaged_planner_begin_to_predict(self, task, c);
-                while (self->samples < all) {
-                    AVERAGED_PLANNER_YIELD(14, 0.5 * work.predict);
-                    averaged_planner_predict_half(self, task, c);
-                }
+                AVERAGED_PLANNER_PREDICT(11, c)
                 averaged_planner_judge(self, task);
             }
         }
@@ -588,25 +555,20 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         /* The best of them and the physics model's plan */
         self->left = averaged_planner_left(self, task, &work);
         if (self->judges) {
-            AVERAGED_PLANNER_YIELD(15, work.predict);
-            averaged_planner_begin_to_predict(self, task, of_physics);
-            while (self->samples < all) {
-                AVERAGED_PLANNER_YIELD(16, 0.5 * work.predict);
-                averaged_planner_predict_half(self, task, of_physics);
-            }
+            AVERAGED_PLANNER_PREDICT(12, of_physics)
             averaged_planner_compare(self, task);
         }
 
         /* What of it may be carried out */
         if (hsep_planner_carrying(planner) > 0.0) {
-            AVERAGED_PLANNER_YIELD(19, hsep_planner_carrying(planner));
+            AVERAGED_PLANNER_YIELD(13, hsep_planner_carrying(planner));
             hsep_planner_carry_out(planner, task->x_d);
         }
 
         /* The window under the plan, and its variances */
         for (self->samples = 0; self->samples < self->late + self->Np;) {
             AVERAGED_PLANNER_YIELD(
-                17, averaged_planner_vary(self, task, &work, NULL) + (self->samples == 0 ? work.commands : 0.0));
+                14, averaged_planner_vary(self, task, &work, NULL) + (self->samples == 0 ? work.commands : 0.0));
             (void)averaged_planner_vary(self, task, &work, c);
         }
         break;
@@ -634,7 +596,7 @@ HSEP_API void hsep_averaged_planner_begin(
 {
     const size_t late = (size_t)self->late * sizeof(hsep_real);
     hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
-    self->place = self->solving = 0;
+    self->place = 0;
     averaged_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
     memcpy(hsep_at(self, self->physics), task->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
     memcpy(hsep_at(self, self->command) + self->preview, task->late_command, late);
@@ -657,5 +619,8 @@ HSEP_API void hsep_averaged_planner_begin(
     self->follows = self->judges && best > 1 && self->paused == 0;
     self->ends = (best == 0 && was_planned > 0) || (self->judges && best > 1 && self->paused > 0);
     self->paused -= self->paused > 0;
-    averaged_planner_go_on(self, task);
+    const averaged_planner_work work = averaged_planner_work_of(self, task);
+    /* This sample has cost that; what is learned at the end of the last window costs as much as commands of a plan */
+    self->next = 3.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
+    self->left = self->next + averaged_planner_left(self, task, &work);
 }

@@ -41,7 +41,7 @@ typedef struct {
     hsep_int tries;         /* and lengths of it that were tried */
     hsep_int samples;       /* samples that are predicted, */
     hsep_int spline;        /* splines whose change of x_h, or row of the programme, is computed */
-    hsep_int solving;       /* whether a bounded programme is being solved */
+    hsep_int status;        /* hsep_plan_status of the programme that is being solved */
     hsep_int planned;       /* model of the plan: 0 none, 1 physics, 2 averaged */
     hsep_int paused;        /* windows that the averaged model does not plan, now */
     hsep_int pause;         /* and after the next of its plans that runs away */

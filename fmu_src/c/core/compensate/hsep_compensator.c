@@ -231,9 +231,7 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
         state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
     hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
     hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
-    const hsep_plan_status status = hsep_planner_factor(hsep_compensator_planner(self))
-                                        ? hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact)
-                                        : HSEP_PLAN_FAILED;
+    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact);
     self->state = (hsep_int)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }
@@ -256,9 +254,8 @@ static int compensator_plan(hsep_compensator *self)
     if (status == HSEP_PLAN_FAILED && self->compensate != HSEP_SEP_OFF) {
         status = compensator_try(self, HSEP_SEP_PHYSICS);
     } else if (self->compensate == HSEP_SEP_OFF && before != HSEP_SEP_OFF) {
-        hsep_planner *planner = hsep_compensator_planner(self);
-        hsep_planner_end(planner, hsep_at(predictor, predictor->x_d));
-        status = hsep_planner_factor(planner) ? hsep_planner_solve(planner, &compensator_exact) : HSEP_PLAN_FAILED;
+        hsep_planner_end(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
+        status = hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact);
     }
     predictor->n_physics = self->state == HSEP_SEP_HYBRID ? 0 : predictor->Np;
     return status == HSEP_PLAN_BOUNDED;

@@ -6,8 +6,6 @@
 
 #include <string.h>
 
-static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
-
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters)
 {
     const hsep_int half = parameters->Np / 2;
@@ -55,12 +53,10 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
     for (int i = 0; i < 3; i++) {
         self->x_d_before[i] = start;
     }
-    hsep_splines_init(
-        (hsep_splines *)hsep_at(self, self->splines), parameters->preview, parameters->spacing, parameters->limit);
+    hsep_splines_init(hsep_part(self, self->splines), parameters->preview, parameters->spacing, parameters->limit);
     if (self->stop > 0) {
         hsep_stop_init(
-            (hsep_stop *)hsep_at(self, self->stop), hsep_planner_splines(self), parameters->known,
-            planner_shared(parameters));
+            hsep_part(self, self->stop), hsep_planner_splines(self), parameters->known, planner_shared(parameters));
     }
 }
 
@@ -177,15 +173,6 @@ HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_re
     return bounded / (hsep_real)self->Np;
 }
 
-static hsep_problem planner_problem(hsep_planner *self)
-{
-    return hsep_interior_problem(planner_interior(self), hsep_planner_splines(self));
-}
-
-HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self) { return planner_problem(self).v; }
-
-HSEP_API const hsep_real *hsep_planner_found(hsep_planner *self) { return planner_problem(self).x; }
-
 /* The first spline that this cost is of, and the triangle of its quadratic part. */
 static hsep_int planner_first(const hsep_planner *self) { return hsep_planner_splines(self)->n - self->solved.n; }
 
@@ -198,7 +185,7 @@ static const hsep_real *planner_triangle(const hsep_planner *self)
 /* Rows of splines x, (m,), of this cost. */
 static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows[])
 {
-    hsep_real *c = planner_problem(self).c;
+    hsep_real *c = hsep_planner_problem(self).c;
     hsep_knots_widen(&self->solved, x, c);
     hsep_splines_rows(hsep_planner_splines(self), c, planner_first(self), rows);
 }
@@ -219,7 +206,7 @@ HSEP_API void hsep_planner_change(hsep_planner *self)
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)
 {
     const hsep_int n = self->solved.m;
-    const hsep_problem problem = planner_problem(self);
+    const hsep_problem problem = hsep_planner_problem(self);
     hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0;
     hsep_splines_jerk(
         hsep_planner_splines(self), jerk_weight, hsep_at(self, self->third), planner_first(self), problem.products,
@@ -272,7 +259,7 @@ static void planner_pin(hsep_planner *self)
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_problem problem = planner_problem(self);
+    const hsep_problem problem = hsep_planner_problem(self);
     const hsep_real *b = hsep_splines_shape(splines);
     const hsep_int spacing = splines->spacing, width = 4 * spacing, first = self->n_pinned, n = splines->n - first;
     hsep_real *P = hsep_planner_quadratic(self), *delta = problem.low;
@@ -297,14 +284,6 @@ HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
     }
 }
 
-HSEP_API int hsep_planner_factor(hsep_planner *self)
-{
-    const hsep_int m = self->solved.m;
-    hsep_real *factor = hsep_at(self, self->factor);
-    memcpy(factor, planner_triangle(self), (size_t)hsep_triangle(m) * sizeof(hsep_real));
-    return hsep_cholesky_rows(factor, m, 0, m, NULL);
-}
-
 /* The remainder of the last plan as this cost counts, (m,), m: no change of it, or what it is. */
 static void planner_start(hsep_planner *self, hsep_real x[])
 {
@@ -321,7 +300,7 @@ static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_toleran
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int preview = splines->preview;
     const hsep_real *total = hsep_at(self, self->total);
-    const hsep_problem problem = planner_problem(self);
+    const hsep_problem problem = hsep_planner_problem(self);
     hsep_real *low = problem.low, *high = problem.high;
     planner_start(self, problem.x);
     planner_rows(self, problem.x, low);
@@ -332,13 +311,14 @@ static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_toleran
         low[r] = least - other + tolerance->margin;
         high[r] = most - other - tolerance->margin;
     }
-    hsep_interior_begin(planner_interior(self), splines, &self->solved, planner_triangle(self), cost, tolerance);
+    hsep_interior_begin(
+        hsep_part(self, self->interior), splines, &self->solved, planner_triangle(self), cost, tolerance);
 }
 
 /* Change the remainder of the last plan by a step x, (m,), m, of this cost. */
 static void planner_take(hsep_planner *self, const hsep_real x[])
 {
-    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self), *c = planner_problem(self).c;
+    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self), *c = hsep_planner_problem(self).c;
     hsep_knots_widen(&self->solved, x, c);
     for (hsep_int j = 0; j < self->solved.n; j++) {
         rest[j] += c[j];
@@ -348,10 +328,14 @@ static void planner_take(hsep_planner *self, const hsep_real x[])
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance)
 {
     const hsep_int n = self->solved.m;
-    const hsep_real *row = planner_triangle(self), *factor = hsep_at(self, self->factor);
-    const hsep_problem problem = planner_problem(self);
+    const hsep_real *row = planner_triangle(self);
+    const hsep_problem problem = hsep_planner_problem(self);
     hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low, *start = problem.high; /* work */
-
+    hsep_real *factor = hsep_at(self, self->factor);
+    memcpy(factor, row, (size_t)hsep_triangle(n) * sizeof(hsep_real));
+    if (!hsep_cholesky_rows(factor, n, 0, n, NULL)) {
+        return HSEP_PLAN_FAILED;
+    }
     memcpy(free_minimum, v, (size_t)n * sizeof(hsep_real));
     hsep_cholesky_solve(factor, n, free_minimum);
     planner_start(self, start);
@@ -386,10 +370,10 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tole
 
 HSEP_API int hsep_planner_advance(hsep_planner *self)
 {
-    if (!hsep_interior_advance(planner_interior(self), hsep_planner_splines(self), planner_triangle(self))) {
+    if (!hsep_interior_advance(hsep_part(self, self->interior), hsep_planner_splines(self), planner_triangle(self))) {
         return 0;
     }
-    const hsep_problem problem = planner_problem(self);
+    const hsep_problem problem = hsep_planner_problem(self);
     hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high, finite = 0.0;
     planner_start(self, at);
     for (hsep_int j = 0; j < self->solved.m; j++) {
@@ -401,8 +385,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
     planner_rows(self, way, rows);
     planner_rows(self, at, from);
     const hsep_real share = planner_share(self, from, rows);
-    for (hsep_int j = 0; j < self->solved.m;
-         j++) { /* bounds that are exceeded, as steps are limited, are so by little */
+    for (hsep_int j = 0; j < self->solved.m; j++) { /* bounds that are exceeded as steps are limited are so by little */
         way[j] = isfinite(finite) ? at[j] + share * way[j] : 0.0;
     }
     planner_take(self, way);
@@ -411,7 +394,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
 
 HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self)
 {
-    const hsep_stop *stop = (const hsep_stop *)hsep_at_const(self, self->stop);
+    const hsep_stop *stop = hsep_part_const(self, self->stop);
     return self->stop > 0 ? HSEP_STOP_WORK * (hsep_real)stop->preview : 0.0;
 }
 
@@ -419,8 +402,7 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[])
 {
     if (self->stop > 0) {
         const hsep_stop_task task = {.x_d = x_d, .x_d_before = self->x_d_before, .delta_before = self->delta_before};
-        hsep_stop_carry_out(
-            (hsep_stop *)hsep_at(self, self->stop), hsep_planner_splines(self), &task, hsep_at(self, self->c));
+        hsep_stop_carry_out(hsep_part(self, self->stop), hsep_planner_splines(self), &task, hsep_at(self, self->c));
     }
 }
 
@@ -441,6 +423,6 @@ HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
         c[i] = i + kept < n ? c[i + kept] : 0.0;
     }
     if (self->stop > 0) {
-        hsep_stop_next((hsep_stop *)hsep_at(self, self->stop), kept);
+        hsep_stop_next(hsep_part(self, self->stop), kept);
     }
 }
