@@ -13,6 +13,44 @@ static const hsep_tolerance averaged_planner_tolerance = {HSEP_NEWTON_TOLERANCE}
 HSEP_ASSERT(reaches, sizeof averaged_planner_reaches == HSEP_AVERAGED_STEPS * sizeof(hsep_real));
 HSEP_ASSERT(lengths, sizeof averaged_planner_lengths == HSEP_AVERAGED_TRIES * sizeof(hsep_real));
 
+HSEP_API hsep_real hsep_averaged_planner_lay_out(
+    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
+{
+    const hsep_int n = hsep_splines_count(planner->preview, planner->spacing);
+    const hsep_real all = (hsep_real)parameters->n, coefficients = HSEP_N_DECIDED + (hsep_real)n,
+                    filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
+    const hsep_int n_pinned = hsep_planner_n_pinned(planner);
+    const hsep_int m = hsep_knots_of(n - n_pinned, planner->Np / planner->spacing).m;
+    const hsep_real preview = (hsep_real)planner->preview;
+    hsep_real end = HSEP_WORDS(hsep_averaged_planner);
+    self->preview = planner->preview;
+    self->late = hsep_late(parameters->settings);
+    self->Np = planner->Np;
+    self->n = n;
+    self->m = m;
+    const hsep_int fit = n_pinned * planner->spacing / HSEP_NEWTON_STEP;
+    self->n_steps = fit < 1 ? 1 : fit < HSEP_AVERAGED_STEPS ? fit : HSEP_AVERAGED_STEPS;
+    self->rest = hsep_take(&end, coefficients);
+    self->best = hsep_take(&end, coefficients);
+    self->of_physics = hsep_take(&end, coefficients);
+    self->change = hsep_take(&end, (hsep_real)m);
+    self->found = hsep_take(&end, (hsep_real)m);
+    self->command = hsep_take(&end, all);
+    self->x_pb = hsep_take(&end, all);
+    self->e_h = hsep_take(&end, all + (hsep_real)parameters->settings->p);
+    self->target = hsep_take(&end, preview);
+    self->weight = hsep_take(&end, preview);
+    self->begins = hsep_take(&end, (hsep_real)m);
+    self->shapes = hsep_take(&end, HSEP_AVERAGED_SHAPES * (hsep_real)planner->spacing);
+    self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
+    self->gram = hsep_take(&end, hsep_triangle(m));
+    self->W = hsep_take(&end, (hsep_real)m * preview);
+    self->linearised = hsep_take_block(&end, hsep_linearised_lay_out(&(hsep_linearised){0}, parameters));
+    self->physics = hsep_take_block(&end, filter);
+    self->trial = hsep_take_block(&end, filter);
+    return end * sizeof(hsep_real);
+}
+
 /* Whether a plan costs less than another; not if it is NaN. */
 static int averaged_planner_better(hsep_real cost, hsep_real other)
 {
@@ -30,11 +68,11 @@ static void averaged_planner_command(
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
-    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
+    hsep_physics *trial = hsep_part(self, self->trial);
     memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(hsep_real));
     for (hsep_int k = 0; k < self->preview; k++) {
         const hsep_int j = self->preview - 1 - k;
-        command[j] = task->x_d[k] - self->start + hsep_splines_sum(splines, c, count, k) + task->load[k];
+        command[j] = task->x_d[k] - task->predictor->start + hsep_splines_sum(splines, c, count, k) + task->load[k];
         hsep_physics_forced_response(trial, &command[j], &x_pb[j], 1);
     }
 }
@@ -92,17 +130,14 @@ static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_a
     hsep_real error = 0.0;
     for (hsep_int k = 0; k < self->preview; k++) {
         const hsep_int j = self->preview - 1 - k;
-        const hsep_real e = weight[k] * (task->x_d[k] - self->start - (x_pb[j] + e_h[j]));
+        const hsep_real e = weight[k] * (task->x_d[k] - task->predictor->start - (x_pb[j] + e_h[j]));
         error += e * e;
     }
     return error + hsep_planner_jerk(task->planner, c, hsep_at(self, self->target));
 }
 
 /* Samples that the splines begin with, which are solved for. */
-static hsep_int *averaged_planner_begins(hsep_averaged_planner *self)
-{
-    return (hsep_int *)hsep_at(self, self->begins);
-}
+static hsep_int *averaged_planner_begins(hsep_averaged_planner *self) { return hsep_part(self, self->begins); }
 
 /* A spline with this distance of knots. */
 static hsep_linearised_change averaged_planner_shape(
@@ -124,7 +159,7 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
     hsep_planner_open(task->planner, task->x_d);
     hsep_planner_change(task->planner);
     for (hsep_int k = 0; k < self->preview; k++) {
-        target[k] = weight[k] * weight[k] * (task->x_d[k] - self->start - x_pb[self->preview - 1 - k]);
+        target[k] = weight[k] * weight[k] * (task->x_d[k] - task->predictor->start - x_pb[self->preview - 1 - k]);
     }
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_int level = hsep_knots_at(&task->planner->knots, i).level, begin = averaged_planner_begins(self)[i];
@@ -143,12 +178,12 @@ static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_a
     const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
     const hsep_real *e_h = hsep_at(self, self->e_h), *weight = hsep_at(self, self->weight);
     hsep_real *target = hsep_at(self, self->target);
-    hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
+    hsep_linearised *linearised = hsep_part(self, self->linearised);
     const hsep_int reach = self->n_steps == 1 ? 1 : self->steps; /* one step alone has the second one */
     hsep_linearised_at(linearised, task->model, command, x_pb, averaged_planner_reaches[reach]);
     for (hsep_int k = 0; k < self->preview; k++) { /* weighted x_d - x_h, to which W c is added */
         const hsep_int j = self->preview - 1 - k;
-        target[k] = weight[k] * (task->x_d[k] - self->start - (x_pb[j] + e_h[j]));
+        target[k] = weight[k] * (task->x_d[k] - task->predictor->start - (x_pb[j] + e_h[j]));
     }
 }
 
@@ -171,7 +206,7 @@ static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_ave
     const hsep_int first = self->spline, count = averaged_planner_together(task->planner, first);
     const hsep_int spacing = hsep_planner_splines(task->planner)->spacing;
     const hsep_real *weight = hsep_at(self, self->weight);
-    hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
+    hsep_linearised *linearised = hsep_part(self, self->linearised);
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
     const hsep_int level = hsep_knots_at(&task->planner->knots, first).level, apart = spacing << level;
     const hsep_int from = averaged_planner_begins(self)[first];
@@ -226,7 +261,8 @@ static void averaged_planner_products(hsep_averaged_planner *self, hsep_planner 
     self->spline = end;
 }
 
-HSEP_API void hsep_averaged_planner_shape(hsep_averaged_planner *self, hsep_planner *plans, const hsep_real spline[])
+/* Splines of each distance of knots, and what they give with the physics model alone. */
+static void averaged_planner_shape_all(hsep_averaged_planner *self, hsep_planner *plans, const hsep_real spline[])
 {
     const hsep_splines *splines = hsep_planner_splines(plans);
     const hsep_int spacing = splines->spacing, preview = self->preview;
@@ -257,6 +293,23 @@ HSEP_API void hsep_averaged_planner_shape(hsep_averaged_planner *self, hsep_plan
         hsep_at(self, self->gram), hsep_planner_quadratic(plans), (size_t)hsep_triangle(self->m) * sizeof(hsep_real));
 }
 
+HSEP_API void hsep_averaged_planner_init(
+    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
+    hsep_planner *plans, const hsep_real spline[])
+{
+    (void)hsep_averaged_planner_lay_out(self, parameters, planner);
+    self->pause =
+        (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings->T_s) + 0.5);
+    hsep_linearised_init(hsep_part(self, self->linearised), parameters);
+    const hsep_int half = self->preview / 2, begin = self->Np > half ? self->Np : half, falling = self->preview - begin;
+    hsep_real *weight = hsep_at(self, self->weight);
+    for (hsep_int k = 0; k < self->preview; k++) {
+        const hsep_real left = (hsep_real)(self->preview - k) / (hsep_real)(falling + 1);
+        weight[k] = k < begin ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
+    }
+    averaged_planner_shape_all(self, plans, spline);
+}
+
 /* Steps of the solver for the physics model's plan, and for a Newton step. */
 static hsep_int averaged_planner_physics_steps(const hsep_averaged_planner *self)
 {
@@ -268,7 +321,8 @@ static hsep_int averaged_planner_steps(const hsep_averaged_planner *self, hsep_i
     return step == 0 && self->n_steps > 1 ? HSEP_NEWTON_FIRST_STEPS : averaged_planner_tolerance.steps;
 }
 
-/* Do a part of the solution of a programme in so many steps: its factor with what its bounds allow, then its solver's. */
+/* Do a part of the solution of a programme in so many steps: its factor and what its bounds allow, then the solver's.
+ */
 static void averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int steps)
 {
     hsep_tolerance tolerance = averaged_planner_tolerance;
@@ -394,7 +448,7 @@ static hsep_real averaged_planner_of_products(hsep_averaged_planner *self, hsep_
 static hsep_real averaged_planner_of_columns(
     hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, hsep_int first)
 {
-    const hsep_linearised *linearised = (const hsep_linearised *)hsep_at_const(self, self->linearised);
+    const hsep_linearised *linearised = hsep_part_const(self, self->linearised);
     const hsep_real begun = averaged_planner_is_first(task->planner, first) ? 6.0 * work->number : 0.0;
     return begun + hsep_linearised_work(linearised, task->model, averaged_planner_begins(self)[first]);
 }
@@ -591,19 +645,22 @@ HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_a
     return self->place == 0;
 }
 
-HSEP_API void hsep_averaged_planner_begin(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best, int warm)
+HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best)
 {
+    const hsep_predictor *predictor = task->predictor;
     const size_t late = (size_t)self->late * sizeof(hsep_real);
+    const hsep_real *residuals = hsep_at_const(predictor, predictor->past_e) + predictor->n; /* last ones measured */
     hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
     self->place = 0;
     averaged_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
-    memcpy(hsep_at(self, self->physics), task->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
-    memcpy(hsep_at(self, self->command) + self->preview, task->late_command, late);
-    memcpy(hsep_at(self, self->x_pb) + self->preview, task->late_x, late);
-    memcpy(hsep_at(self, self->e_h) + self->preview + self->late, task->residuals, (size_t)self->p * sizeof(hsep_real));
+    memcpy(
+        hsep_at(self, self->physics), hsep_at_const(predictor, predictor->physics),
+        (size_t)(self->trial - self->physics) * sizeof(hsep_real));
+    memcpy(hsep_at(self, self->command) + self->preview, hsep_at_const(predictor, predictor->command) + self->Np, late);
+    memcpy(hsep_at(self, self->x_pb) + self->preview, hsep_at_const(predictor, predictor->past_x) + self->Np, late);
+    memcpy(hsep_at(self, self->e_h) + self->preview + self->late, residuals, (size_t)predictor->p * sizeof(hsep_real));
     for (hsep_int k = 0; k < self->preview; k++) {
-        path[self->preview - 1 - k] = task->x_d[k] - self->start;
+        path[self->preview - 1 - k] = task->x_d[k] - task->predictor->start;
     }
     self->bound = averaged_planner_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
     task->planner->change = hsep_averaged_doubts(task->model) ? 1.0 : self->bound;
@@ -615,7 +672,7 @@ HSEP_API void hsep_averaged_planner_begin(
         hsep_at(self, self->e_h), self->samples);
     const hsep_int was_planned = self->planned;
     self->planned = best > 0;
-    self->judges = self->planned && warm && task->model->predicted[HSEP_STATIC];
+    self->judges = self->planned && (hsep_real)predictor->k >= predictor->n_init && task->model->predicted[HSEP_STATIC];
     self->follows = self->judges && best > 1 && self->paused == 0;
     self->ends = (best == 0 && was_planned > 0) || (self->judges && best > 1 && self->paused > 0);
     self->paused -= self->paused > 0;

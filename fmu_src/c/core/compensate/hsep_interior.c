@@ -35,16 +35,12 @@ static void slacks_take_rows(const slacks *self, const hsep_real *low, const hse
 {
     hsep_real *second = to + self->n / 2;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        const hsep_int begin = self->range[order].begin, end = begin + self->range[order].count;
-        hsep_int r = begin;
-        for (; r + HSEP_LANES <= end; r += HSEP_LANES, to += HSEP_LANES, second += HSEP_LANES) {
-            *hsep_lanes_at(to) = *hsep_lanes_const(low + r);
-            *hsep_lanes_at(second) = -*hsep_lanes_const(high + r);
+        const hsep_int begin = self->range[order].begin, count = self->range[order].count;
+        memcpy(to, low + begin, (size_t)count * sizeof(hsep_real));
+        for (hsep_int r = 0; r < count; r++) {
+            second[r] = -high[begin + r];
         }
-        for (; r < end; r++) {
-            *to++ = low[r];
-            *second++ = -high[r];
-        }
+        to += count, second += count;
     }
 }
 
@@ -53,13 +49,11 @@ static void slacks_give_rows(const slacks *self, const hsep_real *y, hsep_real s
 {
     const hsep_real *high = y + self->n / 2;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        hsep_real *rows = self->rows + self->range[order].begin, *end = rows + self->range[order].count;
-        for (; rows + HSEP_LANES <= end; rows += HSEP_LANES, y += HSEP_LANES, high += HSEP_LANES) {
-            *hsep_lanes_at(rows) = *hsep_lanes_const(y) + sign * *hsep_lanes_const(high);
-        }
-        for (; rows < end; rows++) {
-            *rows = *y++ + sign * *high++;
-        }
+        hsep_real *rows = self->rows + self->range[order].begin;
+        const hsep_int count = self->range[order].count;
+        memcpy(rows, y, (size_t)count * sizeof(hsep_real));
+        hsep_axpy(rows, sign, high, count);
+        y += count, high += count;
     }
 }
 

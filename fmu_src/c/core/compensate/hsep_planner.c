@@ -69,12 +69,10 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
     const hsep_int preview = splines->preview;
     hsep_real *total = hsep_at(self, self->total), *moves = hsep_at(self, self->moves);
     /* apart: a sum would be rounded to what a position is, much coarser than a third difference of a change */
-    hsep_real path[HSEP_ORDERS] = {0.0}, change[HSEP_ORDERS] = {0.0};
+    hsep_real path[HSEP_ORDERS], change[HSEP_ORDERS];
     hsep_splines_exceeded(splines, x_d, self->x_d_before, preview, hsep_at(self, self->own));
-    for (int i = 0; i < 3; i++) {
-        hsep_differ(path, self->x_d_before[i]);
-        hsep_differ(change, self->delta_before[i]);
-    }
+    hsep_differ_from(path, self->x_d_before);
+    hsep_differ_from(change, self->delta_before);
     for (hsep_int k = 0; k < preview; k++) {
         hsep_differ(path, x_d[k]);
         hsep_differ(change, hsep_planner_delta(self, k));
@@ -145,10 +143,8 @@ static int planner_allow(const hsep_planner *self, const hsep_real way[])
 static hsep_real planner_third(const hsep_planner *self, const hsep_real c[], hsep_int count, hsep_real third[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    hsep_real now[HSEP_ORDERS] = {0.0}, squares = 0.0;
-    for (int i = 0; i < 3; i++) {
-        hsep_differ(now, self->delta_before[i]);
-    }
+    hsep_real now[HSEP_ORDERS], squares = 0.0;
+    hsep_differ_from(now, self->delta_before);
     for (hsep_int k = 0; k < splines->preview; k++) {
         hsep_differ(now, hsep_splines_sum(splines, c, count, k));
         third[k] = now[3];

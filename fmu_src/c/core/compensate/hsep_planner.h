@@ -55,7 +55,7 @@ HSEP_ASSERT_WORDS(hsep_planner, 40);
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
 {
-    return (const hsep_splines *)hsep_at_const(self, self->splines);
+    return hsep_part_const(self, self->splines);
 }
 
 /* Where its programme is; x: the change that was found last. */

@@ -100,15 +100,8 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
     splines_change(self, c, first, rows);
     for (unsigned order = 1; order < HSEP_ORDERS; order++) {
         const hsep_real *of = rows + (order - 1) * preview;
-        hsep_real *to = rows + order * preview;
-        hsep_int k = 1;
-        to[0] = of[0];
-        for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
-            *hsep_lanes_at(to + k) = *hsep_lanes_const(of + k) - *hsep_lanes_const(of + k - 1);
-        }
-        for (; k < preview; k++) {
-            to[k] = of[k] - of[k - 1];
-        }
+        memcpy(rows + order * preview, of, (size_t)preview * sizeof(hsep_real));
+        hsep_axpy(rows + order * preview + 1, -1.0, of, preview - 1);
     }
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         hsep_real *row = rows + order * preview;
@@ -127,10 +120,8 @@ HSEP_API void hsep_splines_exceeded(
     const hsep_splines *self, const hsep_real x_d[], const hsep_real before[3], hsep_int count, hsep_real rows[])
 {
     const hsep_int near = 4 * self->spacing;
-    hsep_real now[HSEP_ORDERS] = {0.0};
-    for (int i = 0; i < 3; i++) {
-        hsep_differ(now, before[i]);
-    }
+    hsep_real now[HSEP_ORDERS];
+    hsep_differ_from(now, before);
     for (hsep_int k = 0; k < count; k++) {
         hsep_differ(now, x_d[k]);
         for (unsigned order = 1; order < HSEP_ORDERS; order++) {

@@ -77,10 +77,7 @@ static void stop_rows(const hsep_stop *self, const hsep_splines *splines, const 
 {
     hsep_real now[HSEP_ORDERS] = {0.0};
     for (hsep_int k = 0; k < self->preview; k++) {
-        hsep_differ(now, hsep_splines_sum(splines, c, self->count, k));
-        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-            rows[order * self->preview + k] = now[order] * splines->share[order];
-        }
+        hsep_splines_row(splines, now, hsep_splines_sum(splines, c, self->count, k), rows, self->preview, k);
     }
 }
 
@@ -90,12 +87,10 @@ static void stop_bounds(hsep_stop *self, const hsep_splines *splines, const hsep
     const hsep_int preview = self->preview;
     const hsep_real most = 1.0 - HSEP_QP_ROUNDING, *start = hsep_at(self, self->start);
     hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
-    hsep_real path[HSEP_ORDERS] = {0.0}, change[HSEP_ORDERS] = {0.0};
+    hsep_real path[HSEP_ORDERS], change[HSEP_ORDERS];
     hsep_splines_exceeded(splines, task->x_d, task->x_d_before, preview, low);
-    for (int i = 0; i < 3; i++) {
-        hsep_differ(path, task->x_d_before[i]);
-        hsep_differ(change, task->delta_before[i]);
-    }
+    hsep_differ_from(path, task->x_d_before);
+    hsep_differ_from(change, task->delta_before);
     for (hsep_int k = 0; k < preview; k++) {
         hsep_differ(path, task->x_d[k]);
         hsep_differ(change, 0.0);
