@@ -194,12 +194,6 @@ static hsep_int averaged_planner_together(const hsep_planner *planner, hsep_int 
     return left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
 }
 
-/* Whether a spline is the first of its distance of knots. */
-static int averaged_planner_is_first(const hsep_planner *planner, hsep_int i)
-{
-    return i == 0 || hsep_knots_at(&planner->knots, i - 1).last < i;
-}
-
 /* Weighted changes of x_h by the next splines; the first of a distance of knots begins the linearisation. */
 static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
@@ -208,10 +202,10 @@ static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_ave
     const hsep_real *weight = hsep_at(self, self->weight);
     hsep_linearised *linearised = hsep_part(self, self->linearised);
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
-    const hsep_int level = hsep_knots_at(&task->planner->knots, first).level, apart = spacing << level;
-    const hsep_int from = averaged_planner_begins(self)[first];
-    if (averaged_planner_is_first(task->planner, first)) {
-        const hsep_linearised_change change = averaged_planner_shape(self, task->planner, level);
+    const hsep_knot knot = hsep_knots_at(&task->planner->knots, first);
+    const hsep_int apart = spacing << knot.level, from = averaged_planner_begins(self)[first];
+    if (first == knot.first) {
+        const hsep_linearised_change change = averaged_planner_shape(self, task->planner, knot.level);
         hsep_linearised_begin(linearised, task->model, &change);
     }
     for (hsep_int c = 0; c < count; c++) {
@@ -449,8 +443,9 @@ static hsep_real averaged_planner_of_columns(
     hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, hsep_int first)
 {
     const hsep_linearised *linearised = hsep_part_const(self, self->linearised);
-    const hsep_real begun = averaged_planner_is_first(task->planner, first) ? 6.0 * work->number : 0.0;
-    return begun + hsep_linearised_work(linearised, task->model, averaged_planner_begins(self)[first]);
+    const int is_first = hsep_knots_at(&task->planner->knots, first).first == first;
+    return (is_first ? 6.0 * work->number : 0.0) +
+           hsep_linearised_work(linearised, task->model, averaged_planner_begins(self)[first]);
 }
 
 /* Predict the next samples under a plan with variances, one for every apart; without one only count what they take. */

@@ -329,16 +329,6 @@ static int compensator_monitor(hsep_compensator *self, hsep_real error)
 
 HSEP_API void hsep_compensator_load(hsep_compensator *self, hsep_real x_load) { self->x_load = x_load; }
 
-/* Take in the load of a sample, which the drive meets preview samples later. */
-static void compensator_take_load(hsep_compensator *self)
-{
-    const hsep_predictor *predictor = hsep_compensator_predictor(self);
-    if (predictor->k == 0) {
-        self->first_load = self->x_load;
-    }
-    hsep_at(self, self->loads)[predictor->k % predictor->preview] = self->x_load - self->first_load;
-}
-
 /* Take over the loads of the next window and of what follows it. */
 static void compensator_begin_loads(hsep_compensator *self)
 {
@@ -356,7 +346,8 @@ static void compensator_begin_loads(hsep_compensator *self)
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    compensator_take_load(self);
+    self->first_load = predictor->k == 0 ? self->x_load : self->first_load;
+    hsep_at(self, self->loads)[predictor->k % predictor->preview] = self->x_load - self->first_load;
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d - predictor->late);
     const hsep_real error = (predictor->early ? predictor->next : x_meas) - x_d[predictor->k % predictor->Np];
     const int is_sound = compensator_monitor(self, error) || !self->averaged;

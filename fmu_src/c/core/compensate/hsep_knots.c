@@ -41,6 +41,7 @@ HSEP_API hsep_knot hsep_knots_at(const hsep_knots *self, hsep_int i)
     }
     return (hsep_knot){
         .level = (hsep_int)level,
+        .first = end - self->count[level],
         .last = end - 1,
         .begin = self->begin[level] + ((i + self->count[level] - end) << level),
         .length = knots_lengths[level],

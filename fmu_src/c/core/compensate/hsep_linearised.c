@@ -64,8 +64,8 @@ HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_pa
     const hsep_predictor_settings *settings = parameters->settings;
     (void)hsep_linearised_lay_out(self, parameters);
     hsep_physics_init(
-        (hsep_physics *)hsep_at(self, self->physics), parameters->modes, parameters->n_modes, settings->dead_time,
-        settings->T_s, (hsep_hold)settings->input_hold);
+        hsep_part(self, self->physics), parameters->modes, parameters->n_modes, settings->dead_time, settings->T_s,
+        (hsep_hold)settings->input_hold);
 }
 
 /* Index of a disturbance's first weight among the weights of an expert. */
@@ -162,28 +162,6 @@ static void linearised_of_increments(
     }
 }
 
-/* Part of a change that is neither friction nor stiffness: the change behind G_pb, and as late as the experts of
- * the command take it, and their response to it. */
-static void linearised_command(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change)
-{
-    const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
-    const hsep_real *commands = hsep_at(self, self->commands) + 1;
-    hsep_real *base = hsep_at(self, self->base);
-    memcpy(base, change->passed, (size_t)self->preview * sizeof(hsep_real));
-    for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++) {
-        const hsep_int place = linearised_of_command[i];
-        const hsep_real weight = linearised_weight(model, place, HSEP_COMMAND_RESIDUAL);
-        if (weight > 0.0) {
-            linearised_of_increments(
-                self, hsep_averaged_expert(model, place), change->n, dead_time,
-                hsep_at(self, self->of_command) + i * self->preview);
-            for (hsep_int u = 0; u < self->preview; u++) {
-                base[u] += weight * ((u < dead_time ? 0.0 : commands[u - dead_time]) - change->passed[u]);
-            }
-        }
-    }
-}
-
 /* Slopes are (n, count), sample after sample: of each friction with the commanded velocity, s/m, of each stop operator
  * with the command since it was at its stop, 1/m, of the stiffness with the position, m, of the damping with its
  * velocity, m/s, and of what repeats with the position, 1/m. */
@@ -195,7 +173,7 @@ static void linearised_slopes(
     hsep_real last = disturbances->before.x_d, *slopes = hsep_at(self, self->slopes);
     hsep_real spread[HSEP_FEATURES_N_FRICTION], steepest[HSEP_FEATURES_N_FRICTION];
     hsep_real stops[HSEP_FEATURES_N_STOPS], distances[HSEP_FEATURES_N_STOPS];
-    hsep_int last_at[HSEP_FEATURES_N_STOPS] = {0}, *at_stop = (hsep_int *)hsep_at(self, self->at_stop);
+    hsep_int last_at[HSEP_FEATURES_N_STOPS] = {0}, *at_stop = hsep_part(self, self->at_stop);
     for (hsep_int i = 0; i < HSEP_FEATURES_N_STOPS; i++) {
         stops[i] = disturbances->before.stops[i];
         distances[i] = hsep_disturbances_spread(scale, HSEP_FEATURES_N_FRICTION + i);
@@ -244,7 +222,23 @@ HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model,
         position[u] = change->passed[u];
     }
     self->moves = change->n + 2 < self->preview ? change->n + 2 : self->preview;
-    linearised_command(self, model, change);
+    /* What is neither friction nor stiffness: the change behind G_pb, and as late as the experts of the command take
+     * it, and their response to it */
+    const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
+    hsep_real *base = hsep_at(self, self->base);
+    memcpy(base, change->passed, (size_t)self->preview * sizeof(hsep_real));
+    for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++) {
+        const hsep_int place = linearised_of_command[i];
+        const hsep_real weight = linearised_weight(model, place, HSEP_COMMAND_RESIDUAL);
+        if (weight > 0.0) {
+            linearised_of_increments(
+                self, hsep_averaged_expert(model, place), change->n, dead_time,
+                hsep_at(self, self->of_command) + i * self->preview);
+            for (hsep_int u = 0; u < self->preview; u++) {
+                base[u] += weight * ((u < dead_time ? 0.0 : commands[1 + u - dead_time]) - change->passed[u]);
+            }
+        }
+    }
     for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
         if (linearised_counts(model, linearised_experts[i])) {
             const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
@@ -287,7 +281,7 @@ static void linearised_add_stops(hsep_linearised *self, hsep_int i, hsep_int fir
     const hsep_real *own = hsep_at(self, self->stops) + 2 * HSEP_FEATURES_N_STOPS * i,
                     *commands = hsep_at(self, self->commands);
     const hsep_real *difference = own + HSEP_FEATURES_N_STOPS;
-    const hsep_int *at_stop = (const hsep_int *)hsep_at(self, self->at_stop) + HSEP_FEATURES_N_STOPS * begin;
+    const hsep_int *at_stop = hsep_part(self, self->at_stop + HSEP_FEATURES_N_STOPS * begin);
     hsep_real *to = hsep_at(self, self->disturbance) + c, before = 0.0;
     for (hsep_int u = 0; u < count; u++, at_stop += HSEP_FEATURES_N_STOPS, to += HSEP_PHYSICS_ABREAST) {
         hsep_real sum = 0.0, now = 0.0, moved = 0.0;
@@ -373,17 +367,15 @@ static void linearised_add(
     const hsep_int parts = (self->preview - first + LINEARISED_TOGETHER - 1) / LINEARISED_TOGETHER; /* of a recursion */
     const hsep_int padded = parts * LINEARISED_TOGETHER;
     hsep_real *run = hsep_at(self, self->run);
+    const hsep_int words = self->filters - self->physics;
+    hsep_physics *filters[HSEP_PHYSICS_ABREAST];          /* G_pb, each from rest */
     for (hsep_int c = 0; c < HSEP_PHYSICS_ABREAST; c++) { /* columns that are shorter, or none, end with zeros */
         const hsep_int begin = c < count ? first + c * spacing : self->preview;
         linearised_disturbance(self, i, begin, c);
         for (hsep_int u = self->preview - begin; u < padded; u++) {
             hsep_at(self, self->disturbance)[HSEP_PHYSICS_ABREAST * u + c] = 0.0;
         }
-    }
-    const hsep_int words = self->filters - self->physics;
-    hsep_physics *filters[HSEP_PHYSICS_ABREAST]; /* G_pb, each from rest */
-    for (hsep_int c = 0; c < HSEP_PHYSICS_ABREAST; c++) {
-        filters[c] = (hsep_physics *)hsep_at(self, self->filters + c * words);
+        filters[c] = hsep_part(self, self->filters + c * words);
         memcpy(filters[c], hsep_at(self, self->physics), (size_t)words * sizeof(hsep_real));
     }
     hsep_physics_abreast(
@@ -426,7 +418,7 @@ HSEP_API void hsep_linearised_columns(
 
 HSEP_API hsep_real hsep_linearised_work(const hsep_linearised *self, hsep_averaged *model, hsep_int first)
 {
-    const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
+    const hsep_physics *physics = hsep_part_const(self, self->physics);
     const hsep_real length = (hsep_real)(self->preview - first);
     hsep_real sum = 0.0;
     for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {

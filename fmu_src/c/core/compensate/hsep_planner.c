@@ -397,8 +397,9 @@ HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self)
 HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[])
 {
     if (self->stop > 0) {
-        const hsep_stop_task task = {.x_d = x_d, .x_d_before = self->x_d_before, .delta_before = self->delta_before};
-        hsep_stop_carry_out(hsep_part(self, self->stop), hsep_planner_splines(self), &task, hsep_at(self, self->c));
+        hsep_stop_carry_out(
+            hsep_part(self, self->stop), hsep_planner_splines(self), x_d, self->x_d_before, self->delta_before,
+            hsep_at(self, self->c));
     }
 }
 

@@ -82,17 +82,19 @@ static void stop_rows(const hsep_stop *self, const hsep_splines *splines, const 
 }
 
 /* Bounds of the rows of a change: what limits and command leave, and the last stop at least. */
-static void stop_bounds(hsep_stop *self, const hsep_splines *splines, const hsep_stop_task *task)
+static void stop_bounds(
+    hsep_stop *self, const hsep_splines *splines, const hsep_real x_d[], const hsep_real x_d_before[3],
+    const hsep_real delta_before[3])
 {
     const hsep_int preview = self->preview;
     const hsep_real most = 1.0 - HSEP_QP_ROUNDING, *start = hsep_at(self, self->start);
     hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
     hsep_real path[HSEP_ORDERS], change[HSEP_ORDERS];
-    hsep_splines_exceeded(splines, task->x_d, task->x_d_before, preview, low);
-    hsep_differ_from(path, task->x_d_before);
-    hsep_differ_from(change, task->delta_before);
+    hsep_splines_exceeded(splines, x_d, x_d_before, preview, low);
+    hsep_differ_from(path, x_d_before);
+    hsep_differ_from(change, delta_before);
     for (hsep_int k = 0; k < preview; k++) {
-        hsep_differ(path, task->x_d[k]);
+        hsep_differ(path, x_d[k]);
         hsep_differ(change, 0.0);
         for (unsigned order = 0; order < HSEP_ORDERS; order++) {
             const hsep_int r = order * preview + k;
@@ -127,7 +129,8 @@ static int stop_share(const hsep_stop *self, hsep_real length, hsep_real *share)
 }
 
 HSEP_API void hsep_stop_carry_out(
-    hsep_stop *self, const hsep_splines *splines, const hsep_stop_task *task, hsep_real plan[])
+    hsep_stop *self, const hsep_splines *splines, const hsep_real x_d[], const hsep_real x_d_before[3],
+    const hsep_real delta_before[3], hsep_real plan[])
 {
     const hsep_int first = HSEP_N_DECIDED + self->shared, rows = HSEP_ORDERS * self->preview;
     const size_t shared = (size_t)first * sizeof(hsep_real);
@@ -143,7 +146,7 @@ HSEP_API void hsep_stop_carry_out(
     memcpy(now, plan, shared);
     stop_behind(self, now);
     stop_rows(self, splines, last, start);
-    stop_bounds(self, splines, task);
+    stop_bounds(self, splines, x_d, x_d_before, delta_before);
     stop_rows(self, splines, own, own_rows);
     stop_rows(self, splines, now, way);
     for (hsep_int r = 0; r < rows; r++) {

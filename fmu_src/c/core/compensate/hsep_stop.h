@@ -33,22 +33,17 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_stop, 14);
 
-/* What is known where a plan begins. */
-typedef struct {
-    const hsep_real *x_d;          /* (preview,) m, commanded positions, */
-    const hsep_real *x_d_before;   /* (3,) m, and the last ones before the plan, */
-    const hsep_real *delta_before; /* (3,) m, with their changes */
-} hsep_stop_task;
-
 /* shared: splines of a window, and those that the next plan leaves as they are. */
 HSEP_API hsep_real hsep_stop_lay_out(hsep_stop *self, hsep_int preview, hsep_int spacing, hsep_int shared);
 
 /* Fill the block, which is 0, at rest, for plans of these splines. */
 HSEP_API void hsep_stop_init(hsep_stop *self, const hsep_splines *splines, hsep_int preview, hsep_int shared);
 
-/* Shorten a plan, (3 + n,) m, to what has a stop, and keep that. Cost: 250 operations a sample of the preview. */
+/* Shorten a plan, (3 + n,) m, to what has a stop, and keep that. x_d: (preview,) m, commanded positions; before it the
+ * last three ones, m, and their changes. Cost: 250 operations a sample of the preview. */
 HSEP_API void hsep_stop_carry_out(
-    hsep_stop *self, const hsep_splines *splines, const hsep_stop_task *task, hsep_real plan[]);
+    hsep_stop *self, const hsep_splines *splines, const hsep_real x_d[], const hsep_real x_d_before[3],
+    const hsep_real delta_before[3], hsep_real plan[]);
 
 /* Move on by a window of so many splines. */
 HSEP_API void hsep_stop_next(hsep_stop *self, hsep_int kept);
