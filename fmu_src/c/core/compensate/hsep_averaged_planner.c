@@ -385,6 +385,11 @@ static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_ave
     averaged_planner_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
+/* Work is counted in multiply-adds of loops over arrays. As so many counts a number that is computed apart, with
+ * branches, divisions or loads for itself alone; and a sample of a mode. */
+#define AVERAGED_PLANNER_NUMBER 20.0
+#define AVERAGED_PLANNER_MODE 9.0
+
 /* Multiply-adds of the parts of a plan, counted from the sizes. */
 typedef struct {
     hsep_real number;    /* one of every sample of the plan */
@@ -392,7 +397,8 @@ typedef struct {
     hsep_real sample;    /* a sample of its prediction, with its variance, */
     hsep_real row;       /* and a row of features for variances */
     hsep_real predict;   /* half of a prediction without variances, and of its cost */
-    hsep_real linearise; /* slopes of the disturbances, and gains with them */
+    hsep_real linearise; /* slopes of the disturbances, and gains with them, */
+    hsep_real column;    /* and a sample of the changes by some splines abreast */
     hsep_real open;      /* a programme that is not of a Newton step, */
     hsep_real solve;     /* the factor of one, its bounds, and whether they allow its minimum, */
     hsep_real step;      /* and a part of a solver's step */
@@ -402,24 +408,28 @@ static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planne
 {
     const hsep_physics *physics = hsep_part_const(self, self->physics);
     const hsep_real all = (hsep_real)(self->preview + self->late);
+    const hsep_real modes = AVERAGED_PLANNER_MODE * (hsep_real)physics->n_modes;
     const hsep_real n = (hsep_real)(self->ends ? task->planner->knots.n : self->m), pairs = n * n;
-    averaged_planner_work work = {.number = HSEP_WORK_NUMBER * (hsep_real)self->preview};
-    hsep_real run = HSEP_N_EXPERTS * HSEP_WORK_NUMBER; /* the stack */
+    averaged_planner_work work = {.number = AVERAGED_PLANNER_NUMBER * (hsep_real)self->preview, .column = 1.0};
+    hsep_real run = HSEP_N_EXPERTS * AVERAGED_PLANNER_NUMBER; /* the stack */
     work.sample = run;
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         if (task->model->predicted[i]) {
             const hsep_expert *expert = hsep_averaged_expert(task->model, i);
             const hsep_real m = (hsep_real)(expert->p + expert->n_static);
-            run += m + 3.0 * HSEP_WORK_NUMBER;                     /* in free run, within bounds, shrunk */
-            work.sample += 2.0 * m + all + 3.0 * HSEP_WORK_NUMBER; /* with the variances before it */
-            work.row += 0.5 * m * (m + HSEP_WORK_NUMBER);
+            run += m + 3.0 * AVERAGED_PLANNER_NUMBER;                     /* in free run, within bounds, shrunk */
+            work.sample += 2.0 * m + all + 3.0 * AVERAGED_PLANNER_NUMBER; /* with the variances before it */
+            work.row += 0.5 * m * (m + AVERAGED_PLANNER_NUMBER);
+            if (hsep_averaged_kind_of(task->model, i) == HSEP_MODEL_RESIDUAL && task->model->shares[i] > 0.0) {
+                work.column += 0.7 * (hsep_real)expert->p + modes + 16.0 + HSEP_FEATURES_N_STOPS; /* early: less p */
+            }
         }
     }
     /* tanh counts as two; change, command, x_pb, velocity, two of the position; what is filtered */
-    work.commands = all * HSEP_WORK_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
-                    all * HSEP_WORK_MODE * (hsep_real)physics->n_modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
+    work.commands = all * AVERAGED_PLANNER_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
+                    all * modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
     work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
-    work.linearise = all * HSEP_WORK_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 14.0);
+    work.linearise = all * AVERAGED_PLANNER_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 14.0);
     work.open = 20.0 * work.number + 5.0 * pairs;
     /* row, bound, slack, multiplier of each order */
     work.solve = 5.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.5);
@@ -433,19 +443,18 @@ static hsep_real averaged_planner_of_products(hsep_averaged_planner *self, hsep_
     hsep_real sum = 0.0;
     for (hsep_int i = begin; i < end && i < self->m; i++) {
         const hsep_int length = self->preview - averaged_planner_begins(self)[i];
-        sum += 0.7 * (hsep_real)(self->m - i) * ((hsep_real)length + HSEP_WORK_NUMBER);
+        sum += 0.7 * (hsep_real)(self->m - i) * ((hsep_real)length + AVERAGED_PLANNER_NUMBER);
     }
     return sum;
 }
 
 /* Columns from one on, with what begins the linearisation of a distance of knots. */
 static hsep_real averaged_planner_of_columns(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, hsep_int first)
+    hsep_averaged_planner *self, const hsep_planner *planner, const averaged_planner_work *work, hsep_int first)
 {
-    const hsep_linearised *linearised = hsep_part_const(self, self->linearised);
-    const int is_first = hsep_knots_at(&task->planner->knots, first).first == first;
-    return (is_first ? 6.0 * work->number : 0.0) +
-           hsep_linearised_work(linearised, task->model, averaged_planner_begins(self)[first]);
+    const hsep_real length = (hsep_real)(self->preview - averaged_planner_begins(self)[first]);
+    const int is_first = hsep_knots_at(&planner->knots, first).first == first;
+    return HSEP_PHYSICS_ABREAST * length * work->column + (is_first ? 6.0 * work->number : 0.0);
 }
 
 /* Predict the next samples under a plan with variances, one for every apart; without one only count what they take. */
@@ -488,7 +497,7 @@ static hsep_real averaged_planner_left(
         hsep_real newton = work->linearise + averaged_planner_of_products(self, 0, self->m) + work->solve +
                            3.0 * work->predict; /* one length of it is enough nearly always */
         for (hsep_int i = 0; i < self->m; i += averaged_planner_together(task->planner, i)) {
-            newton += averaged_planner_of_columns(self, task, work, i);
+            newton += averaged_planner_of_columns(self, task->planner, work, i);
         }
         for (hsep_int i = 0; i < self->n_steps; i++) {
             left += newton + (hsep_real)averaged_planner_steps(self, i) * parts;
@@ -581,7 +590,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             AVERAGED_PLANNER_YIELD(7, work.linearise);
             averaged_planner_linearise(self, task);
             for (self->spline = 0; self->spline < self->m;) {
-                AVERAGED_PLANNER_YIELD(8, averaged_planner_of_columns(self, task, &work, self->spline));
+                AVERAGED_PLANNER_YIELD(8, averaged_planner_of_columns(self, planner, &work, self->spline));
                 averaged_planner_columns(self, task);
             }
             for (self->spline = 0; self->spline < self->m;) {

@@ -14,7 +14,6 @@
 #include "hsep_interior.h"
 #include "hsep_layout.h"
 #include "hsep_splines.h"
-#include "hsep_stop.h"
 
 typedef struct {
     hsep_int Np;                  /* samples of a window */
@@ -130,7 +129,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self);
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[]);
 HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_real c[]);
 
-/* Shorten the plan, once it is made, to what keeps the limits whatever follows what is known (hsep_stop.h). x_d: as for
+/* Shorten the plan, once it is made, to what keeps the limits whatever follows what is known. x_d: as for
  * hsep_planner_open. */
 HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[]);
 

@@ -233,12 +233,6 @@ HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self)
     return sum;
 }
 
-/* Entry (i, j), i <= j, of a triangle of n rows. */
-static hsep_real *splines_entry(hsep_real triangle[], hsep_int n, hsep_int i, hsep_int j)
-{
-    return triangle + i * n - i * (i + 1) / 2 + j; /* rows 0 ... i - 1 have n, n - 1, ... entries */
-}
-
 HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[])
 {
     const hsep_int n = self->n, spacing = self->spacing;
@@ -246,11 +240,12 @@ HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_re
         /* Columns j - d and j: sum over u of s(u + d spacing) s(u), up to where column j is cut off */
         hsep_real sum = 0.0;
         hsep_int u = 0;
-        for (hsep_int j = n; j-- > d;) {
+        for (hsep_int j = n; j-- > d;) { /* rows 0 ... i - 1 have n, n - 1, ... entries */
             for (; u + j * spacing < self->preview; u++) {
                 sum += filtered[u + d * spacing] * filtered[u];
             }
-            *splines_entry(triangle, n, j - d, j) = sum;
+            const hsep_int i = j - d;
+            triangle[i * n - i * (i - 1) / 2 + d] = sum;
         }
     }
 }
