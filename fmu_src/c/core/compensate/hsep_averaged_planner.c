@@ -77,23 +77,17 @@ static void averaged_planner_command(
     }
 }
 
-/* Largest change from sample to sample of a signal over the plan and the late samples, m. */
-static hsep_real averaged_planner_fastest(const hsep_averaged_planner *self, const hsep_real x[])
-{
-    hsep_real fastest = 0.0;
-    for (hsep_int j = 1; j < self->preview + self->late; j++) {
-        fastest = hsep_fmax(fastest, hsep_fabs(x[j - 1] - x[j]));
-    }
-    return fastest;
-}
-
-/* Whether the unmodified commands, and the physics model behind them, outgrow what is learned by HSEP_PLANNING_FASTER.
- */
+/* Whether the unmodified commands, and the physics model behind them, outgrow what is learned by HSEP_PLANNING_FASTER:
+ * in their largest change from sample to sample over the plan and the late samples. */
 static int averaged_planner_outgrows(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
+    const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
+    hsep_real of_command = 0.0, of_model = 0.0;
     averaged_planner_command(self, task, hsep_at(self, self->rest), 0);
-    const hsep_real of_command = averaged_planner_fastest(self, hsep_at(self, self->command));
-    const hsep_real of_model = averaged_planner_fastest(self, hsep_at(self, self->x_pb));
+    for (hsep_int j = 1; j < self->preview + self->late; j++) {
+        of_command = hsep_fmax(of_command, hsep_fabs(command[j - 1] - command[j]));
+        of_model = hsep_fmax(of_model, hsep_fabs(x_pb[j - 1] - x_pb[j]));
+    }
     return !(hsep_fmin(of_command, of_model) <= HSEP_PLANNING_FASTER * task->model->learned.fastest);
 }
 
