@@ -116,17 +116,24 @@ static void averaged_planner_predict_part(
     averaged_planner_predict(self, task, c, left < most ? left : most, 0);
 }
 
-/* Cost of the plan that was predicted last, m2; not finite if the prediction overflows. */
-static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
+/* target := weighted x_d - x_h of the plan that was predicted last, m; return the sum of their squares. */
+static hsep_real averaged_planner_errors(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     const hsep_real *weight = hsep_at(self, self->weight);
-    hsep_real error = 0.0;
+    hsep_real *target = hsep_at(self, self->target), squares = 0.0;
     for (hsep_int k = 0; k < self->preview; k++) {
         const hsep_int j = self->preview - 1 - k;
-        const hsep_real e = weight[k] * (task->x_d[k] - task->predictor->start - (x_pb[j] + e_h[j]));
-        error += e * e;
+        target[k] = weight[k] * (task->x_d[k] - task->predictor->start - (x_pb[j] + e_h[j]));
+        squares += target[k] * target[k];
     }
+    return squares;
+}
+
+/* Cost of the plan that was predicted last, m2; not finite if the prediction overflows. */
+static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
+{
+    const hsep_real error = averaged_planner_errors(self, task);
     return error + hsep_planner_jerk(task->planner, c, hsep_at(self, self->target));
 }
 
@@ -164,21 +171,6 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
         hsep_planner_quadratic(task->planner), hsep_at(self, self->gram),
         (size_t)hsep_triangle(self->m) * sizeof(hsep_real));
     hsep_planner_complete(task->planner, task->planner->jerk_weight);
-}
-
-/* Linearise at the best plan so far, which was predicted last. */
-static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_averaged_task *task)
-{
-    const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
-    const hsep_real *e_h = hsep_at(self, self->e_h), *weight = hsep_at(self, self->weight);
-    hsep_real *target = hsep_at(self, self->target);
-    hsep_linearised *linearised = hsep_part(self, self->linearised);
-    const hsep_int reach = self->n_steps == 1 ? 1 : self->steps; /* one step alone has the second one */
-    hsep_linearised_at(linearised, task->model, command, x_pb, averaged_planner_reaches[reach]);
-    for (hsep_int k = 0; k < self->preview; k++) { /* weighted x_d - x_h, to which W c is added */
-        const hsep_int j = self->preview - 1 - k;
-        target[k] = weight[k] * (task->x_d[k] - task->predictor->start - (x_pb[j] + e_h[j]));
-    }
 }
 
 /* Splines, from one on, whose changes of x_h are computed side by side: they have the same distance of knots. */
@@ -582,7 +574,10 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             self->gains = 0;
             averaged_planner_copy(self, c, rest);
             AVERAGED_PLANNER_YIELD(7, work.linearise);
-            averaged_planner_linearise(self, task);
+            (void)averaged_planner_errors(self, task); /* of the best plan so far, to which W c is added */
+            hsep_linearised_at(
+                hsep_part(self, self->linearised), task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb),
+                averaged_planner_reaches[self->n_steps == 1 ? 1 : self->steps]); /* one alone has the second one */
             for (self->spline = 0; self->spline < self->m;) {
                 AVERAGED_PLANNER_YIELD(8, averaged_planner_of_columns(self, planner, &work, self->spline));
                 averaged_planner_columns(self, task);

@@ -263,8 +263,8 @@ HSEP_API void hsep_linearised_at(
 static void linearised_add_stops(hsep_linearised *self, hsep_int i, hsep_int first, hsep_int c)
 {
     const hsep_int count = self->preview - first, begin = self->n - count;
-    const hsep_real *own = hsep_at(self, self->stops) + 2 * HSEP_FEATURES_N_STOPS * i,
-                    *commands = hsep_at(self, self->commands);
+    const hsep_real *commands = hsep_at(self, self->commands);
+    const hsep_real *own = hsep_at(self, self->stops) + 2 * HSEP_FEATURES_N_STOPS * i;
     const hsep_real *difference = own + HSEP_FEATURES_N_STOPS;
     const hsep_int *at_stop = hsep_part(self, self->at_stop + HSEP_FEATURES_N_STOPS * begin);
     hsep_real *to = hsep_at(self, self->disturbance) + c, before = 0.0;
