@@ -91,31 +91,6 @@ static int averaged_planner_outgrows(hsep_averaged_planner *self, const hsep_ave
     return !(hsep_fmin(of_command, of_model) <= HSEP_PLANNING_FASTER * task->model->learned.fastest);
 }
 
-/* Predict count more samples under a plan: from the first one on, or go on behind those that are predicted; apart as
- * hsep_averaged_go_on has it. */
-static void averaged_planner_predict(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[], hsep_int count, hsep_int apart)
-{
-    const hsep_int first = self->samples;
-    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
-    self->samples += count;
-    if (first == 0) {
-        averaged_planner_command(self, task, c, HSEP_N_DECIDED + self->n);
-        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, count, apart);
-    } else {
-        hsep_averaged_go_on(task->model, x_pb, e_h, first, self->samples, apart);
-    }
-}
-
-/* Predict the next part of all samples: the commands of a plan and the first ones, and then half of all each time. */
-static void averaged_planner_predict_part(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
-{
-    const hsep_int all = self->late + self->preview, left = all - self->samples;
-    const hsep_int most = self->samples == 0 ? all / HSEP_AVERAGED_AT_FIRST : all / 2;
-    averaged_planner_predict(self, task, c, left < most ? left : most, 0);
-}
-
 /* target := weighted x_d - x_h of the plan that was predicted last, m; return the sum of their squares. */
 static hsep_real averaged_planner_errors(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
@@ -443,18 +418,30 @@ static hsep_real averaged_planner_of_columns(
     return HSEP_PHYSICS_ABREAST * length * work->column + (is_first ? 6.0 * work->number : 0.0);
 }
 
-/* Predict the next samples under a plan with variances, one for every apart; without one only count what they take. */
-static hsep_real averaged_planner_vary(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, const hsep_real c[])
+/* Predict the next part of the samples under a plan: with its commands the first ones, then half of all each time; with
+ * variances a few, one for each in the window. Return what it takes; without a plan it is counted only. */
+static hsep_real averaged_planner_predict(
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, const hsep_real c[],
+    int varies)
 {
-    const hsep_int window = self->late + self->Np, is_within = self->samples < window;
-    const hsep_int left = (is_within ? window : self->late + self->preview) - self->samples;
-    const hsep_int apart = is_within ? 1 : HSEP_NEWTON_APART, most = apart * HSEP_AVERAGED_VARIED;
+    const hsep_int first = self->samples, all = self->late + self->preview, window = self->late + self->Np;
+    const hsep_int apart = !varies ? 0 : first < window ? 1 : HSEP_NEWTON_APART; /* as hsep_averaged_go_on has it */
+    const hsep_int left = (apart == 1 ? window : all) - first;
+    const hsep_int most = varies ? apart * HSEP_AVERAGED_VARIED : first == 0 ? all / HSEP_AVERAGED_AT_FIRST : all / 2;
     const hsep_int count = left < most ? left : most;
-    if (c != NULL) {
-        averaged_planner_predict(self, task, c, count, apart);
+    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    if (c != NULL && first == 0) {
+        averaged_planner_command(self, task, c, HSEP_N_DECIDED + self->n);
+        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, count, apart);
+    } else if (c != NULL) {
+        hsep_averaged_go_on(task->model, x_pb, e_h, first, first + count, apart);
     }
-    return (hsep_real)count * work->sample + (hsep_real)((count + apart - 1) / apart) * work->row;
+    self->samples += c != NULL ? count : 0;
+    if (!varies) {
+        return first == 0 ? work->predict : 0.5 * work->predict;
+    }
+    const hsep_real rows = (hsep_real)((count + apart - 1) / apart);
+    return (hsep_real)count * work->sample + rows * work->row + (first == 0 ? work->commands : 0.0);
 }
 
 /* Bound on the work that is left of a plan where it begins, or behind the Newton step. */
@@ -503,11 +490,11 @@ static hsep_real averaged_planner_left(
     case (where):; \
     } while (0)
 
-/* Predict all samples under a plan. */
-#define AVERAGED_PLANNER_PREDICT(where, c) \
-    for (self->samples = 0; self->samples < all;) { \
-        AVERAGED_PLANNER_YIELD(where, self->samples == 0 ? work.predict : 0.5 * work.predict); \
-        averaged_planner_predict_part(self, task, c); \
+/* Predict more samples under a plan, up to one. */
+#define AVERAGED_PLANNER_PREDICT(where, end, c, varies) \
+    while (self->samples < (end)) { \
+        AVERAGED_PLANNER_YIELD(where, averaged_planner_predict(self, task, &work, NULL, varies)); \
+        (void)averaged_planner_predict(self, task, &work, c, varies); \
     }
 
 /* Solve a programme in so many steps of its solver. */
@@ -529,11 +516,8 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
     switch (self->place) {
     case 0:
         /* The remainder of the last plan, with the variances of all plans */
-        while (self->judges && self->samples < all) {
-            AVERAGED_PLANNER_YIELD(1, averaged_planner_vary(self, task, &work, NULL));
-            (void)averaged_planner_vary(self, task, &work, rest);
-        }
         if (self->judges) {
+            AVERAGED_PLANNER_PREDICT(1, all, rest, 1)
             self->cost = averaged_planner_cost(self, task, rest);
         }
 
@@ -558,7 +542,8 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             averaged_planner_copy(self, rest, c);
         }
         if (self->ends && self->judges) {
-            AVERAGED_PLANNER_PREDICT(6, rest)
+            self->samples = 0;
+            AVERAGED_PLANNER_PREDICT(6, all, rest, 0)
             self->cost_of_rest = averaged_planner_cost(self, task, rest);
         }
 
@@ -594,7 +579,8 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             }
             memcpy(hsep_at(self, self->found), hsep_planner_problem(planner).x, (size_t)self->m * sizeof(hsep_real));
             for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
-                AVERAGED_PLANNER_PREDICT(11, c)
+                self->samples = 0;
+                AVERAGED_PLANNER_PREDICT(11, all, c, 0)
                 averaged_planner_judge(self, task);
             }
         }
@@ -602,7 +588,8 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         /* The best of them and the physics model's plan */
         self->left = averaged_planner_left(self, task, &work);
         if (self->judges) {
-            AVERAGED_PLANNER_PREDICT(12, of_physics)
+            self->samples = 0;
+            AVERAGED_PLANNER_PREDICT(12, all, of_physics, 0)
             averaged_planner_compare(self, task);
         }
 
@@ -613,11 +600,8 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         }
 
         /* The window under the plan, and its variances */
-        for (self->samples = 0; self->samples < self->late + self->Np;) {
-            AVERAGED_PLANNER_YIELD(
-                14, averaged_planner_vary(self, task, &work, NULL) + (self->samples == 0 ? work.commands : 0.0));
-            (void)averaged_planner_vary(self, task, &work, c);
-        }
+        self->samples = 0;
+        AVERAGED_PLANNER_PREDICT(14, self->late + self->Np, c, 1)
         break;
     default:
         break;
