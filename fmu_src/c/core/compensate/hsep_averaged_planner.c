@@ -13,6 +13,44 @@ static const hsep_tolerance averaged_planner_tolerance = {HSEP_NEWTON_TOLERANCE}
 HSEP_ASSERT(reaches, sizeof averaged_planner_reaches == HSEP_AVERAGED_STEPS * sizeof(hsep_real));
 HSEP_ASSERT(lengths, sizeof averaged_planner_lengths == HSEP_AVERAGED_TRIES * sizeof(hsep_real));
 
+HSEP_API hsep_real hsep_averaged_planner_lay_out(
+    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
+{
+    const hsep_int n = hsep_splines_count(planner->preview, planner->spacing);
+    const hsep_real all = (hsep_real)parameters->n, coefficients = HSEP_N_DECIDED + (hsep_real)n,
+                    filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
+    const hsep_int n_pinned = hsep_planner_n_pinned(planner);
+    const hsep_int m = hsep_knots_of(n - n_pinned, planner->Np / planner->spacing).m;
+    const hsep_real preview = (hsep_real)planner->preview;
+    hsep_real end = HSEP_WORDS(hsep_averaged_planner);
+    self->preview = planner->preview;
+    self->late = hsep_late(parameters->settings);
+    self->Np = planner->Np;
+    self->n = n;
+    self->m = m;
+    const hsep_int fit = n_pinned * planner->spacing / HSEP_NEWTON_STEP;
+    self->n_steps = fit < 1 ? 1 : fit < HSEP_AVERAGED_STEPS ? fit : HSEP_AVERAGED_STEPS;
+    self->rest = hsep_take(&end, coefficients);
+    self->best = hsep_take(&end, coefficients);
+    self->of_physics = hsep_take(&end, coefficients);
+    self->change = hsep_take(&end, (hsep_real)m);
+    self->found = hsep_take(&end, (hsep_real)m);
+    self->command = hsep_take(&end, all);
+    self->x_pb = hsep_take(&end, all);
+    self->e_h = hsep_take(&end, all + (hsep_real)parameters->settings->p);
+    self->target = hsep_take(&end, preview);
+    self->weight = hsep_take(&end, preview);
+    self->begins = hsep_take(&end, (hsep_real)m);
+    self->shapes = hsep_take(&end, HSEP_AVERAGED_SHAPES * (hsep_real)planner->spacing);
+    self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
+    self->gram = hsep_take(&end, hsep_triangle(m));
+    self->W = hsep_take(&end, (hsep_real)m * preview);
+    self->linearised = hsep_take_block(&end, hsep_linearised_lay_out(&(hsep_linearised){0}, parameters));
+    self->physics = hsep_take_block(&end, filter);
+    self->trial = hsep_take_block(&end, filter);
+    return end * sizeof(hsep_real);
+}
+
 /* Whether a plan costs less than another; not if it is NaN. */
 static int averaged_planner_better(hsep_real cost, hsep_real other)
 {
@@ -30,85 +68,52 @@ static void averaged_planner_command(
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
-    hsep_physics *trial = (hsep_physics *)hsep_at(self, self->trial);
+    hsep_physics *trial = hsep_part(self, self->trial);
     memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(hsep_real));
     for (hsep_int k = 0; k < self->preview; k++) {
         const hsep_int j = self->preview - 1 - k;
-        command[j] = task->x_d[k] - self->start + hsep_splines_sum(splines, c, count, k) + task->load[k];
+        command[j] = task->x_d[k] - task->predictor->start + hsep_splines_sum(splines, c, count, k) + task->load[k];
         hsep_physics_forced_response(trial, &command[j], &x_pb[j], 1);
     }
 }
 
-/* Largest change from sample to sample of a signal over the plan and the late samples, m. */
-static hsep_real averaged_planner_fastest(const hsep_averaged_planner *self, const hsep_real x[])
-{
-    hsep_real fastest = 0.0;
-    for (hsep_int j = 1; j < self->preview + self->late; j++) {
-        fastest = hsep_fmax(fastest, hsep_fabs(x[j - 1] - x[j]));
-    }
-    return fastest;
-}
-
-/* Whether the unmodified commands, and the physics model behind them, outgrow what is learned by HSEP_PLANNING_FASTER.
- */
+/* Whether the unmodified commands, and the physics model behind them, outgrow what is learned by HSEP_PLANNING_FASTER:
+ * in their largest change from sample to sample over the plan and the late samples. */
 static int averaged_planner_outgrows(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
+    const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
+    hsep_real of_command = 0.0, of_model = 0.0;
     averaged_planner_command(self, task, hsep_at(self, self->rest), 0);
-    const hsep_real of_command = averaged_planner_fastest(self, hsep_at(self, self->command));
-    const hsep_real of_model = averaged_planner_fastest(self, hsep_at(self, self->x_pb));
+    for (hsep_int j = 1; j < self->preview + self->late; j++) {
+        of_command = hsep_fmax(of_command, hsep_fabs(command[j - 1] - command[j]));
+        of_model = hsep_fmax(of_model, hsep_fabs(x_pb[j - 1] - x_pb[j]));
+    }
     return !(hsep_fmin(of_command, of_model) <= HSEP_PLANNING_FASTER * task->model->learned.fastest);
 }
 
-/* Predict count more samples under a plan: from the first one on, or go on behind those that are predicted; apart as
- * hsep_averaged_go_on has it. */
-static void averaged_planner_predict(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[], hsep_int count, hsep_int apart)
+/* target := weighted x_d - x_h of the plan that was predicted last, m; return the sum of their squares. */
+static hsep_real averaged_planner_errors(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    const hsep_int first = self->samples;
-    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
-    self->samples += count;
-    if (first == 0) {
-        averaged_planner_command(self, task, c, HSEP_N_DECIDED + self->n);
-        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, count, apart);
-    } else {
-        hsep_averaged_go_on(task->model, x_pb, e_h, first, self->samples, apart);
+    const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    const hsep_real *weight = hsep_at(self, self->weight);
+    hsep_real *target = hsep_at(self, self->target), squares = 0.0;
+    for (hsep_int k = 0; k < self->preview; k++) {
+        const hsep_int j = self->preview - 1 - k;
+        target[k] = weight[k] * (task->x_d[k] - task->predictor->start - (x_pb[j] + e_h[j]));
+        squares += target[k] * target[k];
     }
-}
-
-/* Commands of a plan, and its first samples; and then half of all, or what is left. */
-static void averaged_planner_begin_to_predict(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
-{
-    self->samples = 0;
-    averaged_planner_predict(self, task, c, (self->late + self->preview) / HSEP_AVERAGED_AT_FIRST, 0);
-}
-
-static void averaged_planner_predict_half(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
-{
-    const hsep_int all = self->late + self->preview, left = all - self->samples;
-    averaged_planner_predict(self, task, c, left < all / 2 ? left : all / 2, 0);
+    return squares;
 }
 
 /* Cost of the plan that was predicted last, m2; not finite if the prediction overflows. */
 static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
 {
-    const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
-    const hsep_real *weight = hsep_at(self, self->weight);
-    hsep_real error = 0.0;
-    for (hsep_int k = 0; k < self->preview; k++) {
-        const hsep_int j = self->preview - 1 - k;
-        const hsep_real e = weight[k] * (task->x_d[k] - self->start - (x_pb[j] + e_h[j]));
-        error += e * e;
-    }
+    const hsep_real error = averaged_planner_errors(self, task);
     return error + hsep_planner_jerk(task->planner, c, hsep_at(self, self->target));
 }
 
 /* Samples that the splines begin with, which are solved for. */
-static hsep_int *averaged_planner_begins(hsep_averaged_planner *self)
-{
-    return (hsep_int *)hsep_at(self, self->begins);
-}
+static hsep_int *averaged_planner_begins(hsep_averaged_planner *self) { return hsep_part(self, self->begins); }
 
 /* A spline with this distance of knots. */
 static hsep_linearised_change averaged_planner_shape(
@@ -130,7 +135,7 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
     hsep_planner_open(task->planner, task->x_d);
     hsep_planner_change(task->planner);
     for (hsep_int k = 0; k < self->preview; k++) {
-        target[k] = weight[k] * weight[k] * (task->x_d[k] - self->start - x_pb[self->preview - 1 - k]);
+        target[k] = weight[k] * weight[k] * (task->x_d[k] - task->predictor->start - x_pb[self->preview - 1 - k]);
     }
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_int level = hsep_knots_at(&task->planner->knots, i).level, begin = averaged_planner_begins(self)[i];
@@ -143,32 +148,11 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
     hsep_planner_complete(task->planner, task->planner->jerk_weight);
 }
 
-/* Linearise at the best plan so far, which was predicted last. */
-static void averaged_planner_linearise(hsep_averaged_planner *self, const hsep_averaged_task *task)
-{
-    const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
-    const hsep_real *e_h = hsep_at(self, self->e_h), *weight = hsep_at(self, self->weight);
-    hsep_real *target = hsep_at(self, self->target);
-    hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
-    const hsep_int reach = self->n_steps == 1 ? 1 : self->steps; /* one step alone has the second one */
-    hsep_linearised_at(linearised, task->model, command, x_pb, averaged_planner_reaches[reach]);
-    for (hsep_int k = 0; k < self->preview; k++) { /* weighted x_d - x_h, to which W c is added */
-        const hsep_int j = self->preview - 1 - k;
-        target[k] = weight[k] * (task->x_d[k] - self->start - (x_pb[j] + e_h[j]));
-    }
-}
-
 /* Splines, from one on, whose changes of x_h are computed side by side: they have the same distance of knots. */
 static hsep_int averaged_planner_together(const hsep_planner *planner, hsep_int first)
 {
     const hsep_int left = hsep_knots_at(&planner->knots, first).last + 1 - first;
     return left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
-}
-
-/* Whether a spline is the first of its distance of knots. */
-static int averaged_planner_is_first(const hsep_planner *planner, hsep_int i)
-{
-    return i == 0 || hsep_knots_at(&planner->knots, i - 1).last < i;
 }
 
 /* Weighted changes of x_h by the next splines; the first of a distance of knots begins the linearisation. */
@@ -177,12 +161,12 @@ static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_ave
     const hsep_int first = self->spline, count = averaged_planner_together(task->planner, first);
     const hsep_int spacing = hsep_planner_splines(task->planner)->spacing;
     const hsep_real *weight = hsep_at(self, self->weight);
-    hsep_linearised *linearised = (hsep_linearised *)hsep_at(self, self->linearised);
+    hsep_linearised *linearised = hsep_part(self, self->linearised);
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
-    const hsep_int level = hsep_knots_at(&task->planner->knots, first).level, apart = spacing << level;
-    const hsep_int from = averaged_planner_begins(self)[first];
-    if (averaged_planner_is_first(task->planner, first)) {
-        const hsep_linearised_change change = averaged_planner_shape(self, task->planner, level);
+    const hsep_knot knot = hsep_knots_at(&task->planner->knots, first);
+    const hsep_int apart = spacing << knot.level, from = averaged_planner_begins(self)[first];
+    if (first == knot.first) {
+        const hsep_linearised_change change = averaged_planner_shape(self, task->planner, knot.level);
         hsep_linearised_begin(linearised, task->model, &change);
     }
     for (hsep_int c = 0; c < count; c++) {
@@ -232,7 +216,8 @@ static void averaged_planner_products(hsep_averaged_planner *self, hsep_planner 
     self->spline = end;
 }
 
-HSEP_API void hsep_averaged_planner_shape(hsep_averaged_planner *self, hsep_planner *plans, const hsep_real spline[])
+/* Splines of each distance of knots, and what they give with the physics model alone. */
+static void averaged_planner_shape_all(hsep_averaged_planner *self, hsep_planner *plans, const hsep_real spline[])
 {
     const hsep_splines *splines = hsep_planner_splines(plans);
     const hsep_int spacing = splines->spacing, preview = self->preview;
@@ -263,6 +248,23 @@ HSEP_API void hsep_averaged_planner_shape(hsep_averaged_planner *self, hsep_plan
         hsep_at(self, self->gram), hsep_planner_quadratic(plans), (size_t)hsep_triangle(self->m) * sizeof(hsep_real));
 }
 
+HSEP_API void hsep_averaged_planner_init(
+    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
+    hsep_planner *plans, const hsep_real spline[])
+{
+    (void)hsep_averaged_planner_lay_out(self, parameters, planner);
+    self->pause =
+        (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings->T_s) + 0.5);
+    hsep_linearised_init(hsep_part(self, self->linearised), parameters);
+    const hsep_int half = self->preview / 2, begin = self->Np > half ? self->Np : half, falling = self->preview - begin;
+    hsep_real *weight = hsep_at(self, self->weight);
+    for (hsep_int k = 0; k < self->preview; k++) {
+        const hsep_real left = (hsep_real)(self->preview - k) / (hsep_real)(falling + 1);
+        weight[k] = k < begin ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
+    }
+    averaged_planner_shape_all(self, plans, spline);
+}
+
 /* Steps of the solver for the physics model's plan, and for a Newton step. */
 static hsep_int averaged_planner_physics_steps(const hsep_averaged_planner *self)
 {
@@ -274,18 +276,18 @@ static hsep_int averaged_planner_steps(const hsep_averaged_planner *self, hsep_i
     return step == 0 && self->n_steps > 1 ? HSEP_NEWTON_FIRST_STEPS : averaged_planner_tolerance.steps;
 }
 
-/* Begin to solve a programme in so many steps, of the physics model's plan or of the Newton step; return whether it has
- * a plan. */
-static int averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int steps)
+/* Do a part of the solution of a programme in so many steps: its factor and what its bounds allow, then the solver's.
+ */
+static void averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int steps)
 {
     hsep_tolerance tolerance = averaged_planner_tolerance;
     tolerance.steps = steps;
 #ifdef HSEP_FLOAT32
     tolerance.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
 #endif
-    const hsep_plan_status status = hsep_planner_solve(task->planner, &tolerance);
-    self->solving = status == HSEP_PLAN_BOUNDED;
-    return status != HSEP_PLAN_FAILED;
+    self->status = self->status == HSEP_PLAN_OPEN        ? hsep_planner_solve(task->planner, &tolerance)
+                   : hsep_planner_advance(task->planner) ? HSEP_PLAN_DONE
+                                                         : HSEP_PLAN_BOUNDED;
 }
 
 /* Judge a length of a step, whose end the planner has, and take it if it is better; otherwise a shorter one is tried.
@@ -344,48 +346,55 @@ static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_ave
     averaged_planner_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
+/* Work is counted in multiply-adds of loops over arrays. As so many counts a number that is computed apart, with
+ * branches, divisions or loads for itself alone; and a sample of a mode. */
+#define AVERAGED_PLANNER_NUMBER 20.0
+#define AVERAGED_PLANNER_MODE 9.0
+
 /* Multiply-adds of the parts of a plan, counted from the sizes. */
 typedef struct {
-    hsep_real begun;     /* what the sample has cost that begins the window */
     hsep_real number;    /* one of every sample of the plan */
     hsep_real commands;  /* commands of a plan, and their disturbances */
     hsep_real sample;    /* a sample of its prediction, with its variance, */
     hsep_real row;       /* and a row of features for variances */
     hsep_real predict;   /* half of a prediction without variances, and of its cost */
-    hsep_real linearise; /* slopes of the disturbances, and gains with them */
-    hsep_real pairs;     /* one of every pair of splines that are solved for, */
-    hsep_real factor;    /* the factor of a programme, */
-    hsep_real solve;     /* its bounds, and whether they allow its minimum, */
+    hsep_real linearise; /* slopes of the disturbances, and gains with them, */
+    hsep_real column;    /* and a sample of the changes by some splines abreast */
+    hsep_real open;      /* a programme that is not of a Newton step, */
+    hsep_real solve;     /* the factor of one, its bounds, and whether they allow its minimum, */
     hsep_real step;      /* and a part of a solver's step */
 } averaged_planner_work;
 
 static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
+    const hsep_physics *physics = hsep_part_const(self, self->physics);
     const hsep_real all = (hsep_real)(self->preview + self->late);
-    const hsep_real n = (hsep_real)(self->ends ? task->planner->knots.n : self->m);
-    averaged_planner_work work = {.number = HSEP_WORK_NUMBER * (hsep_real)self->preview, .pairs = n * n};
-    hsep_real run = HSEP_N_EXPERTS * HSEP_WORK_NUMBER; /* the stack */
+    const hsep_real modes = AVERAGED_PLANNER_MODE * (hsep_real)physics->n_modes;
+    const hsep_real n = (hsep_real)(self->ends ? task->planner->knots.n : self->m), pairs = n * n;
+    averaged_planner_work work = {.number = AVERAGED_PLANNER_NUMBER * (hsep_real)self->preview, .column = 1.0};
+    hsep_real run = HSEP_N_EXPERTS * AVERAGED_PLANNER_NUMBER; /* the stack */
     work.sample = run;
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         if (task->model->predicted[i]) {
             const hsep_expert *expert = hsep_averaged_expert(task->model, i);
             const hsep_real m = (hsep_real)(expert->p + expert->n_static);
-            run += m + 3.0 * HSEP_WORK_NUMBER;                     /* in free run, within bounds, shrunk */
-            work.sample += 2.0 * m + all + 3.0 * HSEP_WORK_NUMBER; /* with the variances before it */
-            work.row += 0.5 * m * (m + HSEP_WORK_NUMBER);
+            run += m + 3.0 * AVERAGED_PLANNER_NUMBER;                     /* in free run, within bounds, shrunk */
+            work.sample += 2.0 * m + all + 3.0 * AVERAGED_PLANNER_NUMBER; /* with the variances before it */
+            work.row += 0.5 * m * (m + AVERAGED_PLANNER_NUMBER);
+            if (hsep_averaged_kind_of(task->model, i) == HSEP_MODEL_RESIDUAL && task->model->shares[i] > 0.0) {
+                work.column += 0.7 * (hsep_real)expert->p + modes + 16.0 + HSEP_FEATURES_N_STOPS; /* early: less p */
+            }
         }
     }
     /* tanh counts as two; change, command, x_pb, velocity, two of the position; what is filtered */
-    work.commands = all * HSEP_WORK_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
-                    all * HSEP_WORK_MODE * (hsep_real)physics->n_modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
-    /* with what is learned at the end of the last window, as much as commands of a plan */
-    work.begun = 3.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
+    work.commands = all * AVERAGED_PLANNER_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
+                    all * modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
     work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
-    work.linearise = all * HSEP_WORK_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 14.0);
-    work.factor = work.pairs * (n / 6.0 + 1.5);
-    work.solve = 5.0 * HSEP_ORDERS * work.number + 2.0 * work.pairs; /* row, bound, slack, multiplier of each order */
-    work.step = (10.0 * HSEP_ORDERS * work.number + work.pairs * (n / 6.0 + 3.0)) / HSEP_INTERIOR_PARTS;
+    work.linearise = all * AVERAGED_PLANNER_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 14.0);
+    work.open = 20.0 * work.number + 5.0 * pairs;
+    /* row, bound, slack, multiplier of each order */
+    work.solve = 5.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.5);
+    work.step = (10.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.0)) / HSEP_INTERIOR_PARTS;
     return work;
 }
 
@@ -395,32 +404,44 @@ static hsep_real averaged_planner_of_products(hsep_averaged_planner *self, hsep_
     hsep_real sum = 0.0;
     for (hsep_int i = begin; i < end && i < self->m; i++) {
         const hsep_int length = self->preview - averaged_planner_begins(self)[i];
-        sum += 0.7 * (hsep_real)(self->m - i) * ((hsep_real)length + HSEP_WORK_NUMBER);
+        sum += 0.7 * (hsep_real)(self->m - i) * ((hsep_real)length + AVERAGED_PLANNER_NUMBER);
     }
     return sum;
 }
 
 /* Columns from one on, with what begins the linearisation of a distance of knots. */
 static hsep_real averaged_planner_of_columns(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, hsep_int first)
+    hsep_averaged_planner *self, const hsep_planner *planner, const averaged_planner_work *work, hsep_int first)
 {
-    const hsep_linearised *linearised = (const hsep_linearised *)hsep_at_const(self, self->linearised);
-    const hsep_real begun = averaged_planner_is_first(task->planner, first) ? 6.0 * work->number : 0.0;
-    return begun + hsep_linearised_work(linearised, task->model, averaged_planner_begins(self)[first]);
+    const hsep_real length = (hsep_real)(self->preview - averaged_planner_begins(self)[first]);
+    const int is_first = hsep_knots_at(&planner->knots, first).first == first;
+    return HSEP_PHYSICS_ABREAST * length * work->column + (is_first ? 6.0 * work->number : 0.0);
 }
 
-/* Predict the next samples under a plan with variances, one for every apart; without one only count what they take. */
-static hsep_real averaged_planner_vary(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, const hsep_real c[])
+/* Predict the next part of the samples under a plan: with its commands the first ones, then half of all each time; with
+ * variances a few, one for each in the window. Return what it takes; without a plan it is counted only. */
+static hsep_real averaged_planner_predict(
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, const hsep_real c[],
+    int varies)
 {
-    const hsep_int window = self->late + self->Np, is_within = self->samples < window;
-    const hsep_int left = (is_within ? window : self->late + self->preview) - self->samples;
-    const hsep_int apart = is_within ? 1 : HSEP_NEWTON_APART, most = apart * HSEP_AVERAGED_VARIED;
+    const hsep_int first = self->samples, all = self->late + self->preview, window = self->late + self->Np;
+    const hsep_int apart = !varies ? 0 : first < window ? 1 : HSEP_NEWTON_APART; /* as hsep_averaged_go_on has it */
+    const hsep_int left = (apart == 1 ? window : all) - first;
+    const hsep_int most = varies ? apart * HSEP_AVERAGED_VARIED : first == 0 ? all / HSEP_AVERAGED_AT_FIRST : all / 2;
     const hsep_int count = left < most ? left : most;
-    if (c != NULL) {
-        averaged_planner_predict(self, task, c, count, apart);
+    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    if (c != NULL && first == 0) {
+        averaged_planner_command(self, task, c, HSEP_N_DECIDED + self->n);
+        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, count, apart);
+    } else if (c != NULL) {
+        hsep_averaged_go_on(task->model, x_pb, e_h, first, first + count, apart);
     }
-    return (hsep_real)count * work->sample + (hsep_real)((count + apart - 1) / apart) * work->row;
+    self->samples += c != NULL ? count : 0;
+    if (!varies) {
+        return first == 0 ? work->predict : 0.5 * work->predict;
+    }
+    const hsep_real rows = (hsep_real)((count + apart - 1) / apart);
+    return (hsep_real)count * work->sample + rows * work->row + (first == 0 ? work->commands : 0.0);
 }
 
 /* Bound on the work that is left of a plan where it begins, or behind the Newton step. */
@@ -431,25 +452,25 @@ static hsep_real averaged_planner_left(
     const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
     hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
     left += hsep_planner_carrying(task->planner);
-    if (self->judges) {
-        left += 2.0 * work->predict; /* of the physics model's plan */
+    left += self->judges ? 2.0 * work->predict : 0.0; /* of the physics model's plan */
+    if (self->place > 0) {
+        return left;
     }
-    if (self->place == 0 && self->judges) {
+    if (self->judges) {
         left += (hsep_real)(window - first + behind) * work->sample +
                 (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
     }
-    const hsep_real programme = 20.0 * work->number + 5.0 * work->pairs + work->factor + work->solve;
-    if (self->place == 0 && self->planned) {
-        left += programme + (hsep_real)averaged_planner_physics_steps(self) * parts;
+    if (self->planned) {
+        left += work->open + work->solve + (hsep_real)averaged_planner_physics_steps(self) * parts;
     }
-    if (self->place == 0 && self->ends) {
-        left += programme + 2.0 * work->predict + (hsep_real)averaged_planner_tolerance.steps * parts;
+    if (self->ends) {
+        left += work->open + work->solve + 2.0 * work->predict + (hsep_real)averaged_planner_tolerance.steps * parts;
     }
-    if (self->place == 0 && self->follows) {
-        hsep_real newton = work->linearise + averaged_planner_of_products(self, 0, self->m) + work->factor +
-                           work->solve + 3.0 * work->predict; /* one length of it is enough nearly always */
+    if (self->follows) {
+        hsep_real newton = work->linearise + averaged_planner_of_products(self, 0, self->m) + work->solve +
+                           3.0 * work->predict; /* one length of it is enough nearly always */
         for (hsep_int i = 0; i < self->m; i += averaged_planner_together(task->planner, i)) {
-            newton += averaged_planner_of_columns(self, task, work, i);
+            newton += averaged_planner_of_columns(self, task->planner, work, i);
         }
         for (hsep_int i = 0; i < self->n_steps; i++) {
             left += newton + (hsep_real)averaged_planner_steps(self, i) * parts;
@@ -469,6 +490,20 @@ static hsep_real averaged_planner_left(
     case (where):; \
     } while (0)
 
+/* Predict more samples under a plan, up to one. */
+#define AVERAGED_PLANNER_PREDICT(where, end, c, varies) \
+    while (self->samples < (end)) { \
+        AVERAGED_PLANNER_YIELD(where, averaged_planner_predict(self, task, &work, NULL, varies)); \
+        (void)averaged_planner_predict(self, task, &work, c, varies); \
+    }
+
+/* Solve a programme in so many steps of its solver. */
+#define AVERAGED_PLANNER_SOLVE(where, steps) \
+    for (self->status = HSEP_PLAN_OPEN; self->status >= HSEP_PLAN_BOUNDED;) { \
+        AVERAGED_PLANNER_YIELD(where, self->status == HSEP_PLAN_OPEN ? work.solve : work.step); \
+        averaged_planner_solve(self, task, steps); \
+    }
+
 /* Make a plan, from one yield to the next. */
 static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
@@ -480,32 +515,18 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
     switch (self->place) {
     case 0:
-        self->left = work.begun + averaged_planner_left(self, task, &work);
-        AVERAGED_PLANNER_YIELD(18, work.begun);
-
         /* The remainder of the last plan, with the variances of all plans */
-        while (self->judges && self->samples < all) {
-            AVERAGED_PLANNER_YIELD(1, averaged_planner_vary(self, task, &work, NULL));
-            (void)averaged_planner_vary(self, task, &work, rest);
-        }
         if (self->judges) {
+            AVERAGED_PLANNER_PREDICT(1, all, rest, 1)
             self->cost = averaged_planner_cost(self, task, rest);
         }
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            AVERAGED_PLANNER_YIELD(2, 20.0 * work.number + 5.0 * work.pairs);
+            AVERAGED_PLANNER_YIELD(2, work.open);
             averaged_planner_open(self, task);
-            AVERAGED_PLANNER_YIELD(4, work.factor);
-            self->planned = (hsep_int)hsep_planner_factor(planner);
-        }
-        if (self->planned) {
-            AVERAGED_PLANNER_YIELD(5, work.solve);
-            self->planned = (hsep_int)averaged_planner_solve(self, task, averaged_planner_physics_steps(self));
-            while (self->solving) {
-                AVERAGED_PLANNER_YIELD(6, work.step);
-                self->solving = !hsep_planner_advance(planner);
-            }
+            AVERAGED_PLANNER_SOLVE(3, averaged_planner_physics_steps(self))
+            self->planned = self->status == HSEP_PLAN_DONE;
         }
         averaged_planner_copy(self, of_physics, c);
         self->judges = self->judges && self->planned;
@@ -515,26 +536,14 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         self->cost_of_rest = self->cost;
         if (self->ends) {
             averaged_planner_copy(self, c, rest);
-            AVERAGED_PLANNER_YIELD(20, 15.0 * work.number + 4.0 * work.pairs);
+            AVERAGED_PLANNER_YIELD(4, work.open);
             hsep_planner_end(planner, task->x_d);
-            AVERAGED_PLANNER_YIELD(21, work.factor);
-            if (hsep_planner_factor(planner)) {
-                AVERAGED_PLANNER_YIELD(22, work.solve);
-                (void)averaged_planner_solve(self, task, averaged_planner_tolerance.steps);
-                while (self->solving) {
-                    AVERAGED_PLANNER_YIELD(23, work.step);
-                    self->solving = !hsep_planner_advance(planner);
-                }
-            }
+            AVERAGED_PLANNER_SOLVE(5, averaged_planner_tolerance.steps)
             averaged_planner_copy(self, rest, c);
         }
         if (self->ends && self->judges) {
-            AVERAGED_PLANNER_YIELD(24, work.predict);
-            averaged_planner_begin_to_predict(self, task, rest);
-            while (self->samples < all) {
-                AVERAGED_PLANNER_YIELD(25, 0.5 * work.predict);
-                averaged_planner_predict_half(self, task, rest);
-            }
+            self->samples = 0;
+            AVERAGED_PLANNER_PREDICT(6, all, rest, 0)
             self->cost_of_rest = averaged_planner_cost(self, task, rest);
         }
 
@@ -550,9 +559,12 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             self->gains = 0;
             averaged_planner_copy(self, c, rest);
             AVERAGED_PLANNER_YIELD(7, work.linearise);
-            averaged_planner_linearise(self, task);
+            (void)averaged_planner_errors(self, task); /* of the best plan so far, to which W c is added */
+            hsep_linearised_at(
+                hsep_part(self, self->linearised), task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb),
+                averaged_planner_reaches[self->n_steps == 1 ? 1 : self->steps]); /* one alone has the second one */
             for (self->spline = 0; self->spline < self->m;) {
-                AVERAGED_PLANNER_YIELD(8, averaged_planner_of_columns(self, task, &work, self->spline));
+                AVERAGED_PLANNER_YIELD(8, averaged_planner_of_columns(self, planner, &work, self->spline));
                 averaged_planner_columns(self, task);
             }
             for (self->spline = 0; self->spline < self->m;) {
@@ -560,27 +572,15 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
                     9, averaged_planner_of_products(self, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
                 averaged_planner_products(self, planner);
             }
-            AVERAGED_PLANNER_YIELD(10, work.factor);
             hsep_planner_complete(planner, planner->jerk_weight);
-            if (!hsep_planner_factor(planner)) {
+            AVERAGED_PLANNER_SOLVE(10, averaged_planner_steps(self, self->steps))
+            if (self->status == HSEP_PLAN_FAILED) {
                 break;
             }
-            AVERAGED_PLANNER_YIELD(11, work.solve);
-            if (!averaged_planner_solve(self, task, averaged_planner_steps(self, self->steps))) {
-                break;
-            }
-            while (self->solving) {
-                AVERAGED_PLANNER_YIELD(12, work.step);
-                self->solving = !hsep_planner_advance(planner);
-            }
-            memcpy(hsep_at(self, self->found), hsep_planner_found(planner), (size_t)self->m * sizeof(hsep_real));
+            memcpy(hsep_at(self, self->found), hsep_planner_problem(planner).x, (size_t)self->m * sizeof(hsep_real));
             for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
-                AVERAGED_PLANNER_YIELD(13, work.predict);
-                averaged_planner_begin_to_predict(self, task, c);
-                while (self->samples < all) {
-                    AVERAGED_PLANNER_YIELD(14, 0.5 * work.predict);
-                    averaged_planner_predict_half(self, task, c);
-                }
+                self->samples = 0;
+                AVERAGED_PLANNER_PREDICT(11, all, c, 0)
                 averaged_planner_judge(self, task);
             }
         }
@@ -588,27 +588,20 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         /* The best of them and the physics model's plan */
         self->left = averaged_planner_left(self, task, &work);
         if (self->judges) {
-            AVERAGED_PLANNER_YIELD(15, work.predict);
-            averaged_planner_begin_to_predict(self, task, of_physics);
-            while (self->samples < all) {
-                AVERAGED_PLANNER_YIELD(16, 0.5 * work.predict);
-                averaged_planner_predict_half(self, task, of_physics);
-            }
+            self->samples = 0;
+            AVERAGED_PLANNER_PREDICT(12, all, of_physics, 0)
             averaged_planner_compare(self, task);
         }
 
         /* What of it may be carried out */
         if (hsep_planner_carrying(planner) > 0.0) {
-            AVERAGED_PLANNER_YIELD(19, hsep_planner_carrying(planner));
+            AVERAGED_PLANNER_YIELD(13, hsep_planner_carrying(planner));
             hsep_planner_carry_out(planner, task->x_d);
         }
 
         /* The window under the plan, and its variances */
-        for (self->samples = 0; self->samples < self->late + self->Np;) {
-            AVERAGED_PLANNER_YIELD(
-                17, averaged_planner_vary(self, task, &work, NULL) + (self->samples == 0 ? work.commands : 0.0));
-            (void)averaged_planner_vary(self, task, &work, c);
-        }
+        self->samples = 0;
+        AVERAGED_PLANNER_PREDICT(14, self->late + self->Np, c, 1)
         break;
     default:
         break;
@@ -629,19 +622,22 @@ HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_a
     return self->place == 0;
 }
 
-HSEP_API void hsep_averaged_planner_begin(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best, int warm)
+HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best)
 {
+    const hsep_predictor *predictor = task->predictor;
     const size_t late = (size_t)self->late * sizeof(hsep_real);
+    const hsep_real *residuals = hsep_at_const(predictor, predictor->past_e) + predictor->n; /* last ones measured */
     hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
-    self->place = self->solving = 0;
+    self->place = 0;
     averaged_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
-    memcpy(hsep_at(self, self->physics), task->physics, (size_t)(self->trial - self->physics) * sizeof(hsep_real));
-    memcpy(hsep_at(self, self->command) + self->preview, task->late_command, late);
-    memcpy(hsep_at(self, self->x_pb) + self->preview, task->late_x, late);
-    memcpy(hsep_at(self, self->e_h) + self->preview + self->late, task->residuals, (size_t)self->p * sizeof(hsep_real));
+    memcpy(
+        hsep_at(self, self->physics), hsep_at_const(predictor, predictor->physics),
+        (size_t)(self->trial - self->physics) * sizeof(hsep_real));
+    memcpy(hsep_at(self, self->command) + self->preview, hsep_at_const(predictor, predictor->command) + self->Np, late);
+    memcpy(hsep_at(self, self->x_pb) + self->preview, hsep_at_const(predictor, predictor->past_x) + self->Np, late);
+    memcpy(hsep_at(self, self->e_h) + self->preview + self->late, residuals, (size_t)predictor->p * sizeof(hsep_real));
     for (hsep_int k = 0; k < self->preview; k++) {
-        path[self->preview - 1 - k] = task->x_d[k] - self->start;
+        path[self->preview - 1 - k] = task->x_d[k] - task->predictor->start;
     }
     self->bound = averaged_planner_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
     task->planner->change = hsep_averaged_doubts(task->model) ? 1.0 : self->bound;
@@ -653,9 +649,12 @@ HSEP_API void hsep_averaged_planner_begin(
         hsep_at(self, self->e_h), self->samples);
     const hsep_int was_planned = self->planned;
     self->planned = best > 0;
-    self->judges = self->planned && warm && task->model->predicted[HSEP_STATIC];
+    self->judges = self->planned && (hsep_real)predictor->k >= predictor->n_init && task->model->predicted[HSEP_STATIC];
     self->follows = self->judges && best > 1 && self->paused == 0;
     self->ends = (best == 0 && was_planned > 0) || (self->judges && best > 1 && self->paused > 0);
     self->paused -= self->paused > 0;
-    averaged_planner_go_on(self, task);
+    const averaged_planner_work work = averaged_planner_work_of(self, task);
+    /* This sample has cost that; what is learned at the end of the last window costs as much as commands of a plan */
+    self->next = 3.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
+    self->left = self->next + averaged_planner_left(self, task, &work);
 }

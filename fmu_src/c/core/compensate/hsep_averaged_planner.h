@@ -18,6 +18,7 @@
 #include "hsep_linearised.h"
 #include "hsep_physics.h"
 #include "hsep_planner.h"
+#include "hsep_predictor.h"
 #include "hsep_averaged_model.h"
 
 #define HSEP_AVERAGED_STEPS 3    /* Newton steps of a plan at most, */
@@ -28,7 +29,7 @@
 #define HSEP_AVERAGED_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
 
 typedef struct {
-    hsep_int preview, p, Np;
+    hsep_int preview, Np;
     hsep_int late;          /* samples before the window that are not measured yet: they are predicted, too */
     hsep_int n, m;          /* splines of a plan, and those that it is solved for */
     hsep_int place;         /* yield behind which the plan goes on; 0: at its beginning */
@@ -41,14 +42,13 @@ typedef struct {
     hsep_int tries;         /* and lengths of it that were tried */
     hsep_int samples;       /* samples that are predicted, */
     hsep_int spline;        /* splines whose change of x_h, or row of the programme, is computed */
-    hsep_int solving;       /* whether a bounded programme is being solved */
+    hsep_int status;        /* hsep_plan_status of the programme that is being solved */
     hsep_int planned;       /* model of the plan: 0 none, 1 physics, 2 averaged */
     hsep_int paused;        /* windows that the averaged model does not plan, now */
     hsep_int pause;         /* and after the next of its plans that runs away */
     hsep_real cost;         /* m2, of the best plan so far, */
     hsep_real cost_of_rest; /* and of the remainder of the last plan */
     hsep_real bound;        /* share of change_max that bounds the averaged model's plan */
-    hsep_real start;        /* m, position of rest */
     hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
     hsep_real left;         /* and that this part and all after it take at most */
     /* Offsets in words from the beginning of the struct */
@@ -72,38 +72,31 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 44);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 42);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
-    hsep_averaged *model;
+    hsep_predictor *predictor;
+    hsep_averaged *model; /* of the predictor */
     hsep_planner *planner;
     const hsep_real *x_d;  /* (preview,) m, commanded positions, */
     const hsep_real *load; /* (preview,) m, and what the drive's load adds to them */
-    /* Before the window: G_pb; command and x_pb of the samples that are not measured yet, (late,) m, newest first; and
-     * the last residuals measured, (p,) m, likewise */
-    const hsep_physics *physics;
-    const hsep_real *late_command, *late_x, *residuals;
 } hsep_averaged_task;
 
 HSEP_API hsep_real hsep_averaged_planner_lay_out(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner);
 
-/* Fill the block, which is 0, for a drive at rest at start, m, with the planner that solves its plans and a spline
- * filtered by the physics model, (preview,), m/m. Cost: m^2 preview / 4 multiply-adds. */
+/* Fill the block, which is 0, with the planner that solves its plans and a spline filtered by the physics model,
+ * (preview,), m/m. Cost: m^2 preview / 4 multiply-adds. */
 HSEP_API void hsep_averaged_planner_init(
     hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
-    hsep_real start, hsep_planner *plans, const hsep_real spline[]);
-
-/* The last part of that: splines of each distance of knots, and what they give with the physics model alone. */
-HSEP_API void hsep_averaged_planner_shape(hsep_averaged_planner *self, hsep_planner *plans, const hsep_real spline[]);
+    hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
- * averaged. warm: whether the warm-up is over, so that the averaged model judges plans. It predicts only the samples
+ * averaged, which judges plans once the warm-up is over. It predicts only the samples
  * that the plan leaves as they are, and the late ones before them. Cost: as hsep_averaged_forecast; a late
  * measurement adds late^2 / 2 multiply-adds for each expert, here and in the last part, for variances. */
-HSEP_API void hsep_averaged_planner_begin(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best, int warm);
+HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best);
 
 /* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that may be left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.

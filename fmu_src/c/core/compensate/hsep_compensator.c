@@ -60,29 +60,25 @@ HSEP_API void hsep_compensator_block_init(
     if (self->averaged) {
         const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
         hsep_averaged_planner_init(
-            hsep_compensator_averaged(self), &model, &parameters->planner, start, hsep_compensator_planner(self),
-            spline);
+            hsep_compensator_averaged(self), &model, &parameters->planner, hsep_compensator_planner(self), spline);
     }
 }
 
 /* Samples of a plan. */
 static hsep_int compensator_horizon(const hsep_compensator *self)
 {
-    return hsep_planner_splines((const hsep_planner *)hsep_at_const(self, self->planner))->preview;
+    return hsep_planner_splines(hsep_part_const(self, self->planner))->preview;
 }
 
 static hsep_averaged_task compensator_task(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     return (hsep_averaged_task){
+        .predictor = predictor,
         .model = hsep_residual_averaged(hsep_predictor_model(predictor)),
         .planner = hsep_compensator_planner(self),
         .x_d = hsep_at(predictor, predictor->x_d),
-        .load = hsep_at(self, self->load),
-        .physics = hsep_predictor_physics(predictor),
-        .late_command = hsep_at(predictor, predictor->command) + predictor->Np,
-        .late_x = hsep_at(predictor, predictor->past_x) + predictor->Np,
-        .residuals = hsep_at(predictor, predictor->past_e) + predictor->n};
+        .load = hsep_at(self, self->load)};
 }
 
 /* target := x_d - the model's response to x_d with the decided part of delta; eq. (3) without a matrix. */
@@ -231,9 +227,7 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
         state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
     hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
     hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
-    const hsep_plan_status status = hsep_planner_factor(hsep_compensator_planner(self))
-                                        ? hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact)
-                                        : HSEP_PLAN_FAILED;
+    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact);
     self->state = (hsep_int)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }
@@ -256,23 +250,11 @@ static int compensator_plan(hsep_compensator *self)
     if (status == HSEP_PLAN_FAILED && self->compensate != HSEP_SEP_OFF) {
         status = compensator_try(self, HSEP_SEP_PHYSICS);
     } else if (self->compensate == HSEP_SEP_OFF && before != HSEP_SEP_OFF) {
-        hsep_planner *planner = hsep_compensator_planner(self);
-        hsep_planner_end(planner, hsep_at(predictor, predictor->x_d));
-        status = hsep_planner_factor(planner) ? hsep_planner_solve(planner, &compensator_exact) : HSEP_PLAN_FAILED;
+        hsep_planner_end(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
+        status = hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact);
     }
     predictor->n_physics = self->state == HSEP_SEP_HYBRID ? 0 : predictor->Np;
     return status == HSEP_PLAN_BOUNDED;
-}
-
-/* Begin a plan on the residual model with averaging; which model planned is known when the plan is made. */
-static void compensator_plan_averaged(hsep_compensator *self)
-{
-    hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const hsep_averaged_task task = compensator_task(self);
-    const int warm = (hsep_real)predictor->k >= predictor->n_init;
-    self->before = self->state;
-    predictor->n_physics = self->compensate == HSEP_SEP_HYBRID ? hsep_predictor_warm_up(predictor, 0) : predictor->Np;
-    hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, self->compensate, warm);
 }
 
 HSEP_API int hsep_compensator_change(
@@ -304,7 +286,7 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     hsep_planner *planner = hsep_compensator_planner(self);
     self->compensate = compensator_lost(self) || self->over == HSEP_OVER ? HSEP_SEP_OFF : self->compensate_next;
     if (hsep_planner_splines(planner)->share[0] != 1.0 / self->change_max_next) {
-        hsep_splines_limit((hsep_splines *)hsep_at(planner, planner->splines), 0, self->change_max_next);
+        hsep_splines_limit(hsep_part(planner, planner->splines), 0, self->change_max_next);
     }
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     hsep_predictor_begin(predictor);
@@ -313,8 +295,12 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     for (hsep_int k = predictor->preview; k < compensator_horizon(self); k++) { /* it goes on at its last velocity */
         x_d[k] = x_d[last] + (x_d[last] - x_d[last - 1]) * (hsep_real)(k - last);
     }
-    if (self->averaged) {
-        compensator_plan_averaged(self);
+    if (self->averaged) { /* which model planned is known when the plan is made */
+        const hsep_averaged_task task = compensator_task(self);
+        const int is_hybrid = self->compensate == HSEP_SEP_HYBRID;
+        self->before = self->state;
+        predictor->n_physics = is_hybrid ? hsep_predictor_warm_up(predictor, 0) : predictor->Np;
+        hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, self->compensate);
     }
     const int solving = self->averaged || compensator_plan(self);
     if (!solving) {
@@ -343,16 +329,6 @@ static int compensator_monitor(hsep_compensator *self, hsep_real error)
 
 HSEP_API void hsep_compensator_load(hsep_compensator *self, hsep_real x_load) { self->x_load = x_load; }
 
-/* Take in the load of a sample, which the drive meets preview samples later. */
-static void compensator_take_load(hsep_compensator *self)
-{
-    const hsep_predictor *predictor = hsep_compensator_predictor(self);
-    if (predictor->k == 0) {
-        self->first_load = self->x_load;
-    }
-    hsep_at(self, self->loads)[predictor->k % predictor->preview] = self->x_load - self->first_load;
-}
-
 /* Take over the loads of the next window and of what follows it. */
 static void compensator_begin_loads(hsep_compensator *self)
 {
@@ -370,7 +346,8 @@ static void compensator_begin_loads(hsep_compensator *self)
 HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    compensator_take_load(self);
+    self->first_load = predictor->k == 0 ? self->x_load : self->first_load;
+    hsep_at(self, self->loads)[predictor->k % predictor->preview] = self->x_load - self->first_load;
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d - predictor->late);
     const hsep_real error = (predictor->early ? predictor->next : x_meas) - x_d[predictor->k % predictor->Np];
     const int is_sound = compensator_monitor(self, error) || !self->averaged;
@@ -389,8 +366,8 @@ HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead
 
 HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs)
 {
-    const hsep_predictor *predictor = (const hsep_predictor *)hsep_at_const(self, self->predictor);
-    const hsep_planner *planner = (const hsep_planner *)hsep_at_const(self, self->planner);
+    const hsep_predictor *predictor = hsep_part_const(self, self->predictor);
+    const hsep_planner *planner = hsep_part_const(self, self->planner);
     const hsep_int i = predictor->k % predictor->Np;
     const int follows = self->averaged && i < hsep_planner_pinned(planner);
     hsep_predictor_read(predictor, &outputs->predicted);

@@ -80,15 +80,12 @@ HSEP_API void hsep_compensator_block_init(
  * the planner, and the one with averaging, if there is one. */
 static inline hsep_predictor *hsep_compensator_predictor(hsep_compensator *self)
 {
-    return (hsep_predictor *)hsep_at(self, self->predictor);
+    return hsep_part(self, self->predictor);
 }
-static inline hsep_planner *hsep_compensator_planner(hsep_compensator *self)
-{
-    return (hsep_planner *)hsep_at(self, self->planner);
-}
+static inline hsep_planner *hsep_compensator_planner(hsep_compensator *self) { return hsep_part(self, self->planner); }
 static inline hsep_averaged_planner *hsep_compensator_averaged(hsep_compensator *self)
 {
-    return (hsep_averaged_planner *)hsep_at(self, self->averaged);
+    return hsep_part(self, self->averaged);
 }
 
 /* Plan the first window. */

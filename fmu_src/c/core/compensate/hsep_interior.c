@@ -35,16 +35,12 @@ static void slacks_take_rows(const slacks *self, const hsep_real *low, const hse
 {
     hsep_real *second = to + self->n / 2;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        const hsep_int begin = self->range[order].begin, end = begin + self->range[order].count;
-        hsep_int r = begin;
-        for (; r + HSEP_LANES <= end; r += HSEP_LANES, to += HSEP_LANES, second += HSEP_LANES) {
-            *hsep_lanes_at(to) = *hsep_lanes_const(low + r);
-            *hsep_lanes_at(second) = -*hsep_lanes_const(high + r);
+        const hsep_int begin = self->range[order].begin, count = self->range[order].count;
+        memcpy(to, low + begin, (size_t)count * sizeof(hsep_real));
+        for (hsep_int r = 0; r < count; r++) {
+            second[r] = -high[begin + r];
         }
-        for (; r < end; r++) {
-            *to++ = low[r];
-            *second++ = -high[r];
-        }
+        to += count, second += count;
     }
 }
 
@@ -53,13 +49,11 @@ static void slacks_give_rows(const slacks *self, const hsep_real *y, hsep_real s
 {
     const hsep_real *high = y + self->n / 2;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        hsep_real *rows = self->rows + self->range[order].begin, *end = rows + self->range[order].count;
-        for (; rows + HSEP_LANES <= end; rows += HSEP_LANES, y += HSEP_LANES, high += HSEP_LANES) {
-            *hsep_lanes_at(rows) = *hsep_lanes_const(y) + sign * *hsep_lanes_const(high);
-        }
-        for (; rows < end; rows++) {
-            *rows = *y++ + sign * *high++;
-        }
+        hsep_real *rows = self->rows + self->range[order].begin;
+        const hsep_int count = self->range[order].count;
+        memcpy(rows, y, (size_t)count * sizeof(hsep_real));
+        hsep_axpy(rows, sign, high, count);
+        y += count, high += count;
     }
 }
 
@@ -172,13 +166,10 @@ static hsep_real slacks_move(const slacks *self)
 typedef struct {
     const hsep_splines *splines;
     const hsep_knots *knots;
-    hsep_int first, n;   /* the first spline that is not fixed; entries of x, as many as there are knots */
-    hsep_real *x, *v;    /* (n,) iterate and linear term */
-    hsep_real *inner;    /* (n,) iterate that is farthest inside the bounds */
+    hsep_int first, n; /* the first spline that is not fixed; entries of x, as many as there are knots */
+    hsep_problem problem;
     hsep_real *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
     hsep_real *factor;   /* triangle of n rows */
-    hsep_real *c;        /* work: uniform splines, */
-    hsep_real *products; /* and their products */
     slacks slacks;
 } interior_arrays;
 
@@ -194,21 +185,21 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n
 {
     const hsep_real columns = (hsep_real)n, rows = HSEP_ORDERS * (hsep_real)preview;
     hsep_real end = HSEP_WORDS(hsep_interior);
-    hsep_real **const of_columns[5] = {&a->x, &a->v, &a->inner, &a->r_d, &a->dx};
+    hsep_real **const of_columns[5] = {&a->problem.x, &a->problem.v, &a->problem.inner, &a->r_d, &a->dx};
     for (int i = 0; i < 5; i++) {
         *of_columns[i] = interior_take(block, &end, columns);
     }
     slacks *bounds = &a->slacks;
-    bounds->rows = interior_take(block, &end, rows);
-    bounds->work = interior_take(block, &end, rows + 4 * HSEP_LANES_MOST);
+    a->problem.low = bounds->rows = interior_take(block, &end, rows);
+    a->problem.high = bounds->work = interior_take(block, &end, rows + 4 * HSEP_LANES_MOST);
     hsep_real **const of_bounds[8] = {&bounds->b,   &bounds->s,   &bounds->z,  &bounds->inverse,
                                       &bounds->r_c, &bounds->r_p, &bounds->ds, &bounds->dz};
     for (int i = 0; i < 8; i++) {
         *of_bounds[i] = interior_take(block, &end, 2.0 * rows);
     }
     a->factor = interior_take(block, &end, hsep_triangle(n));
-    a->c = interior_take(block, &end, columns + 2.0 * HSEP_KNOTS_NEAR);
-    a->products = interior_take(block, &end, HSEP_KNOTS_WIDTH * columns);
+    a->problem.c = interior_take(block, &end, columns + 2.0 * HSEP_KNOTS_NEAR);
+    a->problem.products = interior_take(block, &end, HSEP_KNOTS_WIDTH * columns);
     return end * sizeof(hsep_real);
 }
 
@@ -240,30 +231,24 @@ static interior_arrays interior_open(hsep_interior *self, const hsep_splines *sp
 /* B of x or dx, (n,), to ds. */
 static void interior_rows(const interior_arrays *a, const hsep_real x[])
 {
-    hsep_knots_widen(a->knots, x, a->c);
-    hsep_splines_rows(a->splines, a->c, a->first, a->slacks.rows);
+    hsep_knots_widen(a->knots, x, a->problem.c);
+    hsep_splines_rows(a->splines, a->problem.c, a->first, a->slacks.rows);
     slacks_take_rows(&a->slacks, a->slacks.rows, a->slacks.rows, a->slacks.ds);
 }
 
 /* g, (n,), += A' of the rows. */
 static void interior_transpose(const interior_arrays *a, hsep_real g[])
 {
-    memset(a->c, 0, (size_t)a->knots->n * sizeof(hsep_real));
-    hsep_splines_transpose(a->splines, a->slacks.rows, a->first, a->c);
-    hsep_knots_narrow(a->knots, a->c, g);
+    memset(a->problem.c, 0, (size_t)a->knots->n * sizeof(hsep_real));
+    hsep_splines_transpose(a->splines, a->slacks.rows, a->first, a->problem.c);
+    hsep_knots_narrow(a->knots, a->problem.c, g);
 }
 
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines)
 {
-    const interior_arrays a = interior_open(self, splines);
-    return (hsep_problem){
-        .v = a.v,
-        .x = a.x,
-        .inner = self->beyond < self->tolerance.margin ? a.inner : NULL,
-        .low = a.slacks.rows,
-        .high = a.slacks.work,
-        .c = a.c,
-        .products = a.products};
+    hsep_problem problem = interior_open(self, splines).problem;
+    problem.inner = self->beyond < self->tolerance.margin ? problem.inner : NULL;
+    return problem;
 }
 
 HSEP_API void hsep_interior_begin(
@@ -285,7 +270,7 @@ HSEP_API void hsep_interior_begin(
     }
     a.slacks.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
     slacks_take_rows(&a.slacks, a.slacks.rows, a.slacks.work, a.slacks.b);
-    interior_rows(&a, a.x);
+    interior_rows(&a, a.problem.x);
     slacks_begin(&a.slacks, self->cost);
 }
 
@@ -294,11 +279,11 @@ HSEP_API void hsep_interior_begin(
 static hsep_real interior_dual_residual(const interior_arrays *a, const hsep_real *P)
 {
     hsep_real residual = 0.0, largest = 0.0;
-    memcpy(a->r_d, a->v, (size_t)a->n * sizeof(hsep_real));
+    memcpy(a->r_d, a->problem.v, (size_t)a->n * sizeof(hsep_real));
     for (hsep_int i = 0; i < a->n; i++) { /* v - P x */
         const hsep_int left = a->n - i - 1;
-        a->r_d[i] -= hsep_dot(P, a->x + i, left + 1);
-        hsep_axpy(a->r_d + i + 1, -a->x[i], P + 1, left);
+        a->r_d[i] -= hsep_dot(P, a->problem.x + i, left + 1);
+        hsep_axpy(a->r_d + i + 1, -a->problem.x[i], P + 1, left);
         P += left + 1;
     }
     memset(a->dx, 0, (size_t)a->n * sizeof(hsep_real));
@@ -306,7 +291,8 @@ static hsep_real interior_dual_residual(const interior_arrays *a, const hsep_rea
     interior_transpose(a, a->dx);
     for (hsep_int j = 0; j < a->n; j++) {
         largest = hsep_fmax(
-            hsep_fmax(largest, hsep_fabs(a->v[j])), hsep_fmax(hsep_fabs(a->v[j] - a->r_d[j]), hsep_fabs(a->dx[j])));
+            hsep_fmax(largest, hsep_fabs(a->problem.v[j])),
+            hsep_fmax(hsep_fabs(a->problem.v[j] - a->r_d[j]), hsep_fabs(a->dx[j])));
         a->r_d[j] += a->dx[j];
         residual = hsep_fmax(residual, hsep_fabs(a->r_d[j]));
     }
@@ -327,11 +313,11 @@ static void interior_direction(const interior_arrays *a)
 static int interior_residuals(hsep_interior *self, const interior_arrays *a, const hsep_real P[])
 {
     hsep_real r_p, beyond;
-    interior_rows(a, a->x);
+    interior_rows(a, a->problem.x);
     const hsep_real mu = slacks_take_residuals(&a->slacks, &r_p, &beyond);
     if (beyond < self->beyond) {
         self->beyond = beyond;
-        memcpy(a->inner, a->x, (size_t)a->n * sizeof(hsep_real));
+        memcpy(a->problem.inner, a->problem.x, (size_t)a->n * sizeof(hsep_real));
     }
     const hsep_real r_d = interior_dual_residual(a, P);
     if (self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
@@ -350,8 +336,8 @@ static int interior_factor(const interior_arrays *a, const hsep_real P[], hsep_i
     if (part == 0) {
         memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
         slacks_weigh(&a->slacks);
-        hsep_splines_gram(a->splines, a->slacks.rows, a->first, a->products, a->slacks.work);
-        hsep_knots_add(a->knots, a->products, a->factor, a->c);
+        hsep_splines_gram(a->splines, a->slacks.rows, a->first, a->problem.products, a->slacks.work);
+        hsep_knots_add(a->knots, a->problem.products, a->factor, a->problem.c);
     }
     return !hsep_cholesky_rows(a->factor, a->n, ends[part], ends[part + 1], NULL);
 }
@@ -373,7 +359,7 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
     }
     const hsep_real alpha = slacks_move(&a.slacks);
     for (hsep_int j = 0; j < a.n; j++) {
-        a.x[j] += alpha * a.dx[j];
+        a.problem.x[j] += alpha * a.dx[j];
     }
     return 0;
 }

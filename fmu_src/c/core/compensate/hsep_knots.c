@@ -41,6 +41,7 @@ HSEP_API hsep_knot hsep_knots_at(const hsep_knots *self, hsep_int i)
     }
     return (hsep_knot){
         .level = (hsep_int)level,
+        .first = end - self->count[level],
         .last = end - 1,
         .begin = self->begin[level] + ((i + self->count[level] - end) << level),
         .length = knots_lengths[level],
@@ -52,9 +53,7 @@ HSEP_API void hsep_knots_widen(const hsep_knots *self, const hsep_real x[], hsep
     memset(c, 0, (size_t)self->n * sizeof(hsep_real));
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_knot knot = hsep_knots_at(self, i);
-        for (hsep_int j = 0; j < knot.length; j++) {
-            c[knot.begin + j] += knot.share[j] * x[i];
-        }
+        hsep_axpy(c + knot.begin, x[i], knot.share, knot.length);
     }
 }
 

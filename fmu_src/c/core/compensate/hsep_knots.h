@@ -25,7 +25,7 @@ HSEP_ASSERT_WORDS(hsep_knots, 9);
 
 /* A spline that is solved for: share[i], i < length, of the uniform splines begin + i. */
 typedef struct {
-    hsep_int level, last; /* distance of knots, and the last spline that has it */
+    hsep_int level, first, last; /* distance of knots, and the first and the last spline that have it */
     hsep_int begin, length;
     const hsep_real *share;
 } hsep_knot;

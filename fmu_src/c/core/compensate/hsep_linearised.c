@@ -11,22 +11,19 @@
 #define LINEARISED_BEFORE 2      /* samples at rest before a change */
 #define LINEARISED_TOGETHER 4    /* samples of a recursion that are summed side by side */
 
-static const hsep_int linearised_experts[HSEP_LINEARISED_EXPERTS] = {HSEP_ARX_RESIDUAL, HSEP_STATIC, HSEP_FRESH_START};
-
-#define LINEARISED_OF_COMMAND 2
-static const hsep_int linearised_of_command[LINEARISED_OF_COMMAND] = {HSEP_ARX_COMMAND, HSEP_FRESH_START};
-
-/* Weight of an expert in the stack; 0 where it knows nothing, or predicts the other residual. */
-static hsep_real linearised_weight(const hsep_averaged *model, hsep_int expert, hsep_int kind)
+/* Weight in the stack of an expert that predicts a residual; 0 where it knows nothing, or predicts the other one. i: as
+ * arrays of experts have it. */
+static hsep_real linearised_weight(const hsep_averaged *model, hsep_int i, hsep_int kind)
 {
+    const hsep_int expert = HSEP_REGRESSIONS + i;
     const int of_kind = hsep_averaged_kind_of(model, expert) == kind;
     return model->predicted[expert] && of_kind ? model->shares[expert] : 0.0;
 }
 
-/* Whether columns take work for an expert: it counts, and predicts the residual of the physics model. */
-static int linearised_counts(const hsep_averaged *model, hsep_int expert)
+/* The response of an expert, (preview + 3,), to a change: of the command, or of the features of x_pb. */
+static hsep_real *linearised_response(hsep_linearised *self, hsep_int i)
 {
-    return linearised_weight(model, expert, HSEP_MODEL_RESIDUAL) > 0.0;
+    return hsep_at(self, self->response) + i * (self->preview + LINEARISED_TOGETHER - 1);
 }
 
 HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters)
@@ -40,16 +37,14 @@ HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_res
     self->count = hsep_disturbances_count(parameters);
     self->slopes = hsep_take(&end, n * (hsep_real)self->count);
     self->at_stop = hsep_take(&end, n * HSEP_FEATURES_N_STOPS);
-    self->stops = hsep_take(&end, 2.0 * HSEP_FEATURES_N_STOPS * HSEP_LINEARISED_EXPERTS);
-    self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_LINEARISED_EXPERTS);
-    self->shrink = hsep_take(&end, n * HSEP_LINEARISED_EXPERTS);
-    self->shrinkage = hsep_take(&end, n * LINEARISED_OF_COMMAND);
+    self->stops = hsep_take(&end, 2.0 * HSEP_FEATURES_N_STOPS * HSEP_N_REGRESSIONS);
+    self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_N_REGRESSIONS);
+    self->shrink = hsep_take(&end, n * HSEP_N_REGRESSIONS);
     self->commands = hsep_take(&end, 1.0 + preview);
     self->velocity = hsep_take(&end, preview + LINEARISED_BEFORE);
     self->position = hsep_take(&end, preview + LINEARISED_BEFORE);
     self->base = hsep_take(&end, preview);
-    self->of_command = hsep_take(&end, preview * LINEARISED_OF_COMMAND);
-    self->passed = hsep_take(&end, padded * HSEP_LINEARISED_EXPERTS);
+    self->response = hsep_take(&end, padded * HSEP_N_REGRESSIONS);
     self->run = hsep_take(&end, padded * HSEP_PHYSICS_ABREAST);
     self->lags = hsep_take(&end, HSEP_LANES_MOST * (lags + (LINEARISED_TOGETHER - 1)));
     self->disturbance = hsep_take(&end, padded * HSEP_PHYSICS_ABREAST);
@@ -64,8 +59,8 @@ HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_pa
     const hsep_predictor_settings *settings = parameters->settings;
     (void)hsep_linearised_lay_out(self, parameters);
     hsep_physics_init(
-        (hsep_physics *)hsep_at(self, self->physics), parameters->modes, parameters->n_modes, settings->dead_time,
-        settings->T_s, (hsep_hold)settings->input_hold);
+        hsep_part(self, self->physics), parameters->modes, parameters->n_modes, settings->dead_time, settings->T_s,
+        (hsep_hold)settings->input_hold);
 }
 
 /* Index of a disturbance's first weight among the weights of an expert. */
@@ -162,28 +157,6 @@ static void linearised_of_increments(
     }
 }
 
-/* Part of a change that is neither friction nor stiffness: the change behind G_pb, and as late as the experts of
- * the command take it, and their response to it. */
-static void linearised_command(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change)
-{
-    const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
-    const hsep_real *commands = hsep_at(self, self->commands) + 1;
-    hsep_real *base = hsep_at(self, self->base);
-    memcpy(base, change->passed, (size_t)self->preview * sizeof(hsep_real));
-    for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++) {
-        const hsep_int place = linearised_of_command[i];
-        const hsep_real weight = linearised_weight(model, place, HSEP_COMMAND_RESIDUAL);
-        if (weight > 0.0) {
-            linearised_of_increments(
-                self, hsep_averaged_expert(model, place), change->n, dead_time,
-                hsep_at(self, self->of_command) + i * self->preview);
-            for (hsep_int u = 0; u < self->preview; u++) {
-                base[u] += weight * ((u < dead_time ? 0.0 : commands[u - dead_time]) - change->passed[u]);
-            }
-        }
-    }
-}
-
 /* Slopes are (n, count), sample after sample: of each friction with the commanded velocity, s/m, of each stop operator
  * with the command since it was at its stop, 1/m, of the stiffness with the position, m, of the damping with its
  * velocity, m/s, and of what repeats with the position, 1/m. */
@@ -195,7 +168,7 @@ static void linearised_slopes(
     hsep_real last = disturbances->before.x_d, *slopes = hsep_at(self, self->slopes);
     hsep_real spread[HSEP_FEATURES_N_FRICTION], steepest[HSEP_FEATURES_N_FRICTION];
     hsep_real stops[HSEP_FEATURES_N_STOPS], distances[HSEP_FEATURES_N_STOPS];
-    hsep_int last_at[HSEP_FEATURES_N_STOPS] = {0}, *at_stop = (hsep_int *)hsep_at(self, self->at_stop);
+    hsep_int last_at[HSEP_FEATURES_N_STOPS] = {0}, *at_stop = hsep_part(self, self->at_stop);
     for (hsep_int i = 0; i < HSEP_FEATURES_N_STOPS; i++) {
         stops[i] = disturbances->before.stops[i];
         distances[i] = hsep_disturbances_spread(scale, HSEP_FEATURES_N_FRICTION + i);
@@ -244,13 +217,23 @@ HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model,
         position[u] = change->passed[u];
     }
     self->moves = change->n + 2 < self->preview ? change->n + 2 : self->preview;
-    linearised_command(self, model, change);
-    for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (linearised_counts(model, linearised_experts[i])) {
-            const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
+    /* What is neither friction nor stiffness: the change behind G_pb, and as late as the experts of the command take
+     * it, and their response to it */
+    const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
+    hsep_real *base = hsep_at(self, self->base);
+    memcpy(base, change->passed, (size_t)self->preview * sizeof(hsep_real));
+    for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
+        const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
+        const hsep_real weight = linearised_weight(model, i, HSEP_COMMAND_RESIDUAL);
+        if (linearised_weight(model, i, HSEP_MODEL_RESIDUAL) > 0.0) {
             linearised_pass(
                 hsep_expert_weights(expert) + 1, first - 1, change->passed, self->preview,
-                hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1));
+                linearised_response(self, i));
+        } else if (weight > 0.0) {
+            linearised_of_increments(self, expert, change->n, dead_time, linearised_response(self, i));
+            for (hsep_int u = 0; u < self->preview; u++) {
+                base[u] += weight * ((u < dead_time ? 0.0 : commands[1 + u - dead_time]) - change->passed[u]);
+            }
         }
     }
 }
@@ -260,18 +243,14 @@ HSEP_API void hsep_linearised_at(
 {
     const hsep_int n = self->n, first = linearised_first(self, model);
     linearised_slopes(self, model, x_d, x_pb, reach);
-    for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++) {
-        const hsep_int place = linearised_of_command[i];
-        const hsep_real weight = linearised_weight(model, place, HSEP_COMMAND_RESIDUAL);
-        if (weight > 0.0) {
-            linearised_shrink(hsep_averaged_expert(model, place), weight, n, hsep_at(self, self->shrinkage) + i * n);
-        }
-    }
-    for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
-        const hsep_real weight = linearised_weight(model, linearised_experts[i], HSEP_MODEL_RESIDUAL);
+    for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
+        const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
+        const hsep_real of_model = linearised_weight(model, i, HSEP_MODEL_RESIDUAL);
+        const hsep_real weight = of_model + linearised_weight(model, i, HSEP_COMMAND_RESIDUAL); /* one is 0 */
         if (weight > 0.0) {
             linearised_shrink(expert, weight, n, hsep_at(self, self->shrink) + i * n);
+        }
+        if (of_model > 0.0) {
             linearised_gains(
                 self, hsep_expert_weights(expert) + first, hsep_averaged_disturbances(model)->T_s,
                 hsep_at(self, self->gains) + i * LINEARISED_GAINS * n,
@@ -284,10 +263,10 @@ HSEP_API void hsep_linearised_at(
 static void linearised_add_stops(hsep_linearised *self, hsep_int i, hsep_int first, hsep_int c)
 {
     const hsep_int count = self->preview - first, begin = self->n - count;
-    const hsep_real *own = hsep_at(self, self->stops) + 2 * HSEP_FEATURES_N_STOPS * i,
-                    *commands = hsep_at(self, self->commands);
+    const hsep_real *commands = hsep_at(self, self->commands);
+    const hsep_real *own = hsep_at(self, self->stops) + 2 * HSEP_FEATURES_N_STOPS * i;
     const hsep_real *difference = own + HSEP_FEATURES_N_STOPS;
-    const hsep_int *at_stop = (const hsep_int *)hsep_at(self, self->at_stop) + HSEP_FEATURES_N_STOPS * begin;
+    const hsep_int *at_stop = hsep_part(self, self->at_stop + HSEP_FEATURES_N_STOPS * begin);
     hsep_real *to = hsep_at(self, self->disturbance) + c, before = 0.0;
     for (hsep_int u = 0; u < count; u++, at_stop += HSEP_FEATURES_N_STOPS, to += HSEP_PHYSICS_ABREAST) {
         hsep_real sum = 0.0, now = 0.0, moved = 0.0;
@@ -364,34 +343,31 @@ static void linearised_run(
     }
 }
 
-/* Add what an expert, by its place in linearised_experts, makes of the change. */
+/* Add what an expert of the physics model's residual makes of the change. */
 static void linearised_add(
     hsep_linearised *self, hsep_averaged *model, hsep_int i, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST])
 {
-    const hsep_expert *expert = hsep_averaged_expert(model, linearised_experts[i]);
+    const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
     const hsep_int parts = (self->preview - first + LINEARISED_TOGETHER - 1) / LINEARISED_TOGETHER; /* of a recursion */
     const hsep_int padded = parts * LINEARISED_TOGETHER;
     hsep_real *run = hsep_at(self, self->run);
+    const hsep_int words = self->filters - self->physics;
+    hsep_physics *filters[HSEP_PHYSICS_ABREAST];          /* G_pb, each from rest */
     for (hsep_int c = 0; c < HSEP_PHYSICS_ABREAST; c++) { /* columns that are shorter, or none, end with zeros */
         const hsep_int begin = c < count ? first + c * spacing : self->preview;
         linearised_disturbance(self, i, begin, c);
         for (hsep_int u = self->preview - begin; u < padded; u++) {
             hsep_at(self, self->disturbance)[HSEP_PHYSICS_ABREAST * u + c] = 0.0;
         }
-    }
-    const hsep_int words = self->filters - self->physics;
-    hsep_physics *filters[HSEP_PHYSICS_ABREAST]; /* G_pb, each from rest */
-    for (hsep_int c = 0; c < HSEP_PHYSICS_ABREAST; c++) {
-        filters[c] = (hsep_physics *)hsep_at(self, self->filters + c * words);
+        filters[c] = hsep_part(self, self->filters + c * words);
         memcpy(filters[c], hsep_at(self, self->physics), (size_t)words * sizeof(hsep_real));
     }
     hsep_physics_abreast(
         filters, HSEP_PHYSICS_ABREAST, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)padded);
     linearised_take_lags(self, expert);
     linearised_run(
-        hsep_at(self, self->lags), expert->p, hsep_at(self, self->drive),
-        hsep_at(self, self->passed) + i * (self->preview + LINEARISED_TOGETHER - 1), run, padded);
+        hsep_at(self, self->lags), expert->p, hsep_at(self, self->drive), linearised_response(self, i), run, padded);
     for (hsep_int c = 0; c < count; c++) {
         const hsep_int length = self->preview - first - c * spacing;
         const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - length);
@@ -407,35 +383,19 @@ HSEP_API void hsep_linearised_columns(
 {
     for (hsep_int c = 0; c < count; c++) { /* what does not pass through the disturbances */
         const hsep_int length = self->preview - first - c * spacing;
-        const hsep_real *of_command = hsep_at(self, self->of_command);
-        const hsep_real *shrinkage = hsep_at(self, self->shrinkage) + (self->n - length);
         memcpy(columns[c], hsep_at(self, self->base), (size_t)length * sizeof(hsep_real));
-        for (hsep_int i = 0; i < LINEARISED_OF_COMMAND; i++, shrinkage += self->n, of_command += self->preview) {
-            const int counts = linearised_weight(model, linearised_of_command[i], HSEP_COMMAND_RESIDUAL) > 0.0;
+        for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
+            const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - length);
+            const hsep_real *response = linearised_response(self, i);
+            const int counts = linearised_weight(model, i, HSEP_COMMAND_RESIDUAL) > 0.0;
             for (hsep_int u = 0; counts && u < length; u++) {
-                columns[c][u] += shrinkage[u] * of_command[u];
+                columns[c][u] += shrink[u] * response[u];
             }
         }
     }
-    for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (linearised_counts(model, linearised_experts[i])) {
+    for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
+        if (linearised_weight(model, i, HSEP_MODEL_RESIDUAL) > 0.0) {
             linearised_add(self, model, i, first, spacing, count, columns);
         }
     }
-}
-
-HSEP_API hsep_real hsep_linearised_work(const hsep_linearised *self, hsep_averaged *model, hsep_int first)
-{
-    const hsep_physics *physics = (const hsep_physics *)hsep_at_const(self, self->physics);
-    const hsep_real length = (hsep_real)(self->preview - first);
-    hsep_real sum = 0.0;
-    for (hsep_int i = 0; i < HSEP_LINEARISED_EXPERTS; i++) {
-        if (linearised_counts(model, linearised_experts[i])) {
-            const hsep_real p = (hsep_real)hsep_averaged_expert(model, linearised_experts[i])->p;
-            const hsep_real lags = hsep_fmin(p, length); /* of a sample; the first ones have fewer */
-            sum += 0.85 * lags * (length - 0.5 * lags) +
-                   length * (HSEP_WORK_MODE * (hsep_real)physics->n_modes + 16.0 + HSEP_FEATURES_N_STOPS);
-        }
-    }
-    return HSEP_PHYSICS_ABREAST * (sum + length);
 }

@@ -16,34 +16,25 @@
 #include "hsep_layout.h"
 #include "hsep_averaged_model.h"
 
-/* Work is counted in multiply-adds of loops over arrays. As so many counts a number that is computed apart, with
- * branches, divisions or loads for itself alone; and a sample of a mode. */
-#define HSEP_WORK_NUMBER 20.0
-#define HSEP_WORK_MODE 9.0
-
-#define HSEP_LINEARISED_EXPERTS 3 /* of the physics model's residual */
-
 typedef struct {
     hsep_int n;       /* samples of a prediction, */
     hsep_int preview; /* and its last ones, which a change may reach: all but what is late */
     hsep_int count;   /* disturbances */
     hsep_int moves;   /* samples in which v_d of a change, or of the sample before, is not 0 */
-    /* Offsets in words from the beginning of the struct; oldest first; of experts: of the three experts of the physics
-     * model's residual, one after the other; abreast: HSEP_PHYSICS_ABREAST columns side by side, sample after sample */
+    /* Offsets in words from the beginning of the struct; oldest first; of experts: of all that rows train, one after
+     * the other; abreast: HSEP_PHYSICS_ABREAST columns side by side, sample after sample */
     hsep_int slopes;      /* (n, count) slopes of the disturbances, sample after sample */
     hsep_int at_stop;     /* (n, HSEP_FEATURES_N_STOPS) hsep_int, last sample at which a stop operator was at its stop,
                            * counted from 1; 0: before all of them */
     hsep_int stops;       /* (2, HSEP_FEATURES_N_STOPS) of experts: gains of stop operators and their differences */
     hsep_int gains;       /* (5, n) of experts: gains of disturbances and their differences, from v_d now and a sample
                            * before, from x now and in the two samples before */
-    hsep_int shrink;      /* (n,) of experts: share of each one in the stack, */
-    hsep_int shrinkage;   /* (2, n) and share of each expert of the command */
+    hsep_int shrink;      /* (n,) of experts: share of each one in the stack */
     hsep_int commands;    /* (1 + preview,) of a change, with one sample before it, */
     hsep_int velocity;    /* (2 + preview,) v_d of a change, with two samples before it, */
     hsep_int position;    /* (2 + preview,) and it behind G_pb */
     hsep_int base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
-    hsep_int of_command;  /* (2, preview) and the response of the experts of the command to it */
-    hsep_int passed;      /* (preview + 3,) of experts: the response of the features of x_pb to it */
+    hsep_int response;    /* (preview + 3,) of experts: the response to it, of x_pb's features or of the command */
     hsep_int run;         /* (preview + 3,) abreast: work of a recursion; alone: newest first */
     hsep_int lags;        /* (p + 3,) weights of the lags, as often as a vector has lanes */
     hsep_int disturbance; /* (preview + 3,) abreast: disturbances that a change makes, */
@@ -52,7 +43,7 @@ typedef struct {
     hsep_int filters;     /* and of each column */
 } hsep_linearised;
 
-HSEP_ASSERT_WORDS(hsep_linearised, 22);
+HSEP_ASSERT_WORDS(hsep_linearised, 20);
 
 HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters);
 HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_parameters *parameters);
@@ -75,13 +66,11 @@ HSEP_API void hsep_linearised_at(
     hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach);
 
 /* Changes of x_h, m, by that change of the commands where it begins at the samples first + c spacing of the preview, c
- * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). Cost: hsep_linearised_work. */
+ * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). Cost: HSEP_PHYSICS_ABREAST
+ * (9 n_modes + p + 21) multiply-adds a sample for each expert that predicts the residual of the physics model, and
+ * counts. */
 HSEP_API void hsep_linearised_columns(
     hsep_linearised *self, hsep_averaged *model, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST]);
-
-/* Multiply-adds of the columns whose first one begins at a sample: HSEP_PHYSICS_ABREAST (9 n_modes + p + 11) a sample
- * for each expert that predicts the residual of the physics model, and counts. */
-HSEP_API hsep_real hsep_linearised_work(const hsep_linearised *self, hsep_averaged *model, hsep_int first);
 
 #endif

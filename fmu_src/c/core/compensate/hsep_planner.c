@@ -6,7 +6,31 @@
 
 #include <string.h>
 
-static hsep_interior *planner_interior(hsep_planner *self) { return (hsep_interior *)hsep_at(self, self->interior); }
+#define HSEP_STOP_WORK 250.0 /* multiply-adds for each sample of the preview to carry out a plan */
+
+/* Stops of plans that are longer than the preview: behind the preview a plan takes the command to go on at its last
+ * velocity. What comes may be another command, so each plan has a stop beside it: it shares the splines that are
+ * carried out before the next plan, and then brings the change of the command to a constant within the preview, which
+ * takes nothing of the limits of what follows. A plan is carried out as far as it has a stop within the limits;
+ * otherwise the last stop goes on. */
+typedef struct {
+    hsep_int preview; /* samples of the command that are known */
+    hsep_int
+        shared; /* splines that a stop has from its plan: those of a window, and what the next plan leaves as it is, */
+    hsep_int n; /* and those before all coefficients are alike */
+    hsep_int count; /* coefficients: the decided ones and those of all splines that begin in the preview */
+    hsep_real pole; /* of a change that fades, from spline to spline */
+    /* Offsets in words from the beginning of the struct */
+    hsep_int last;  /* (count,) m, the last stop, */
+    hsep_int own;   /* (count,) m, by which it differs from one that stops as these do, */
+    hsep_int now;   /* (count,) m, and the stop of the plan */
+    hsep_int gains; /* (2 (n - shared),) of the first two differences of coefficients, which make the next one */
+    /* (4 preview,) in shares */
+    hsep_int low, high;            /* bounds of the rows of a change, */
+    hsep_int start, way, own_rows; /* the last stop without its own part, the way to the plan's, and that part */
+} hsep_stop;
+
+HSEP_ASSERT_WORDS(hsep_stop, 14);
 
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters)
 {
@@ -14,10 +38,23 @@ HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameter
     return (half < parameters->pinned ? half : parameters->pinned) / parameters->spacing;
 }
 
-/* Splines that are carried out before the next plan: those of a window, and what that plan leaves as it is. */
-static hsep_int planner_shared(const hsep_planner_parameters *parameters)
+static hsep_real stop_lay_out(hsep_stop *self, const hsep_planner_parameters *parameters)
 {
-    return parameters->Np / parameters->spacing + hsep_planner_n_pinned(parameters);
+    const hsep_int preview = parameters->known, spacing = parameters->spacing;
+    hsep_real end = HSEP_WORDS(hsep_stop);
+    self->preview = preview;
+    self->shared = parameters->Np / spacing + hsep_planner_n_pinned(parameters);
+    self->n = (preview - HSEP_SPLINES_END) / spacing - 2;
+    self->count = HSEP_N_DECIDED + (preview + spacing - 1) / spacing;
+    self->last = hsep_take(&end, (hsep_real)self->count);
+    self->own = hsep_take(&end, (hsep_real)self->count);
+    self->now = hsep_take(&end, (hsep_real)self->count);
+    self->gains = hsep_take(&end, 2.0 * (hsep_real)(self->n - self->shared));
+    hsep_int *const of_rows[5] = {&self->low, &self->high, &self->start, &self->way, &self->own_rows};
+    for (int i = 0; i < 5; i++) {
+        *of_rows[i] = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
+    }
+    return end * sizeof(hsep_real);
 }
 
 HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
@@ -41,11 +78,35 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_p
         hsep_take_block(&end, hsep_splines_lay_out(&(hsep_splines){0}, parameters->preview, parameters->spacing));
     self->interior = hsep_take_block(&end, hsep_interior_size(parameters->preview, n));
     if (parameters->known < parameters->preview) {
-        const hsep_int shared = planner_shared(parameters);
-        self->stop =
-            hsep_take_block(&end, hsep_stop_lay_out(&(hsep_stop){0}, parameters->known, parameters->spacing, shared));
+        self->stop = hsep_take_block(&end, stop_lay_out(&(hsep_stop){0}, parameters));
     }
     return end * sizeof(hsep_real);
+}
+
+/* The gains that minimise the sum of squares of the differences of orders 1 to 3, in limits: a backward Riccati
+ * recursion (Kalman 1960) from a change that is constant. */
+static void stop_gains(hsep_stop *self, const hsep_splines *splines)
+{
+    const hsep_real spacing = (hsep_real)splines->spacing;
+    hsep_real of[HSEP_ORDERS] = {0.0}, unit = 1.0, *gains = hsep_at(self, self->gains);
+    for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+        unit *= spacing;
+        of[order] = (splines->share[order] / unit) * (splines->share[order] / unit);
+    }
+    const hsep_real one = of[1], two = of[2], three = of[3];
+    hsep_real p11 = two + 2.0 * three, p12 = three, p22 = three; /* the difference behind the last spline is 0 */
+    for (hsep_int i = self->n - self->shared; i-- > 0;) {
+        const hsep_real both = p12 + p22, total = one + two + three + p11 + p12 + both;
+        const hsep_real g1 = (two + three + both) / total, g2 = three / total, h1 = g1 - 1.0, h2 = g2 - 1.0;
+        /* The cost of differences x, y before: u = g1 x + g2 y, then u - x, then u - x - y */
+        const hsep_real q11 =
+            one * g1 * g1 + (two + three) * h1 * h1 + p11 * g1 * g1 + 2.0 * p12 * g1 * h1 + p22 * h1 * h1;
+        const hsep_real q12 =
+            one * g1 * g2 + two * h1 * g2 + three * h1 * h2 + p11 * g1 * g2 + p12 * (g1 * g2 + h1 * g2) + p22 * h1 * g2;
+        p22 = one * g2 * g2 + two * g2 * g2 + three * h2 * h2 + (p11 + 2.0 * p12 + p22) * g2 * g2;
+        p11 = q11, p12 = q12;
+        gains[2 * i] = g1, gains[2 * i + 1] = g2;
+    }
 }
 
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start)
@@ -55,12 +116,13 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
     for (int i = 0; i < 3; i++) {
         self->x_d_before[i] = start;
     }
-    hsep_splines_init(
-        (hsep_splines *)hsep_at(self, self->splines), parameters->preview, parameters->spacing, parameters->limit);
+    hsep_splines_init(hsep_part(self, self->splines), parameters->preview, parameters->spacing, parameters->limit);
     if (self->stop > 0) {
-        hsep_stop_init(
-            (hsep_stop *)hsep_at(self, self->stop), hsep_planner_splines(self), parameters->known,
-            planner_shared(parameters));
+        const hsep_splines *splines = hsep_planner_splines(self);
+        hsep_stop *stop = hsep_part(self, self->stop);
+        (void)stop_lay_out(stop, parameters);
+        stop->pole = hsep_exp(-HSEP_STOP_FADE * (hsep_real)splines->spacing / (hsep_real)splines->preview);
+        stop_gains(stop, splines);
     }
 }
 
@@ -73,12 +135,10 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
     const hsep_int preview = splines->preview;
     hsep_real *total = hsep_at(self, self->total), *moves = hsep_at(self, self->moves);
     /* apart: a sum would be rounded to what a position is, much coarser than a third difference of a change */
-    hsep_real path[HSEP_ORDERS] = {0.0}, change[HSEP_ORDERS] = {0.0};
+    hsep_real path[HSEP_ORDERS], change[HSEP_ORDERS];
     hsep_splines_exceeded(splines, x_d, self->x_d_before, preview, hsep_at(self, self->own));
-    for (int i = 0; i < 3; i++) {
-        hsep_differ(path, self->x_d_before[i]);
-        hsep_differ(change, self->delta_before[i]);
-    }
+    hsep_differ_from(path, self->x_d_before);
+    hsep_differ_from(change, self->delta_before);
     for (hsep_int k = 0; k < preview; k++) {
         hsep_differ(path, x_d[k]);
         hsep_differ(change, hsep_planner_delta(self, k));
@@ -149,10 +209,8 @@ static int planner_allow(const hsep_planner *self, const hsep_real way[])
 static hsep_real planner_third(const hsep_planner *self, const hsep_real c[], hsep_int count, hsep_real third[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    hsep_real now[HSEP_ORDERS] = {0.0}, squares = 0.0;
-    for (int i = 0; i < 3; i++) {
-        hsep_differ(now, self->delta_before[i]);
-    }
+    hsep_real now[HSEP_ORDERS], squares = 0.0;
+    hsep_differ_from(now, self->delta_before);
     for (hsep_int k = 0; k < splines->preview; k++) {
         hsep_differ(now, hsep_splines_sum(splines, c, count, k));
         third[k] = now[3];
@@ -177,15 +235,6 @@ HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_re
     return bounded / (hsep_real)self->Np;
 }
 
-static hsep_problem planner_problem(hsep_planner *self)
-{
-    return hsep_interior_problem(planner_interior(self), hsep_planner_splines(self));
-}
-
-HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self) { return planner_problem(self).v; }
-
-HSEP_API const hsep_real *hsep_planner_found(hsep_planner *self) { return planner_problem(self).x; }
-
 /* The first spline that this cost is of, and the triangle of its quadratic part. */
 static hsep_int planner_first(const hsep_planner *self) { return hsep_planner_splines(self)->n - self->solved.n; }
 
@@ -198,7 +247,7 @@ static const hsep_real *planner_triangle(const hsep_planner *self)
 /* Rows of splines x, (m,), of this cost. */
 static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows[])
 {
-    hsep_real *c = planner_problem(self).c;
+    hsep_real *c = hsep_planner_problem(self).c;
     hsep_knots_widen(&self->solved, x, c);
     hsep_splines_rows(hsep_planner_splines(self), c, planner_first(self), rows);
 }
@@ -219,7 +268,7 @@ HSEP_API void hsep_planner_change(hsep_planner *self)
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)
 {
     const hsep_int n = self->solved.m;
-    const hsep_problem problem = planner_problem(self);
+    const hsep_problem problem = hsep_planner_problem(self);
     hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0;
     hsep_splines_jerk(
         hsep_planner_splines(self), jerk_weight, hsep_at(self, self->third), planner_first(self), problem.products,
@@ -272,7 +321,7 @@ static void planner_pin(hsep_planner *self)
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_problem problem = planner_problem(self);
+    const hsep_problem problem = hsep_planner_problem(self);
     const hsep_real *b = hsep_splines_shape(splines);
     const hsep_int spacing = splines->spacing, width = 4 * spacing, first = self->n_pinned, n = splines->n - first;
     hsep_real *P = hsep_planner_quadratic(self), *delta = problem.low;
@@ -297,14 +346,6 @@ HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
     }
 }
 
-HSEP_API int hsep_planner_factor(hsep_planner *self)
-{
-    const hsep_int m = self->solved.m;
-    hsep_real *factor = hsep_at(self, self->factor);
-    memcpy(factor, planner_triangle(self), (size_t)hsep_triangle(m) * sizeof(hsep_real));
-    return hsep_cholesky_rows(factor, m, 0, m, NULL);
-}
-
 /* The remainder of the last plan as this cost counts, (m,), m: no change of it, or what it is. */
 static void planner_start(hsep_planner *self, hsep_real x[])
 {
@@ -321,7 +362,7 @@ static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_toleran
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int preview = splines->preview;
     const hsep_real *total = hsep_at(self, self->total);
-    const hsep_problem problem = planner_problem(self);
+    const hsep_problem problem = hsep_planner_problem(self);
     hsep_real *low = problem.low, *high = problem.high;
     planner_start(self, problem.x);
     planner_rows(self, problem.x, low);
@@ -332,13 +373,14 @@ static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_toleran
         low[r] = least - other + tolerance->margin;
         high[r] = most - other - tolerance->margin;
     }
-    hsep_interior_begin(planner_interior(self), splines, &self->solved, planner_triangle(self), cost, tolerance);
+    hsep_interior_begin(
+        hsep_part(self, self->interior), splines, &self->solved, planner_triangle(self), cost, tolerance);
 }
 
 /* Change the remainder of the last plan by a step x, (m,), m, of this cost. */
 static void planner_take(hsep_planner *self, const hsep_real x[])
 {
-    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self), *c = planner_problem(self).c;
+    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self), *c = hsep_planner_problem(self).c;
     hsep_knots_widen(&self->solved, x, c);
     for (hsep_int j = 0; j < self->solved.n; j++) {
         rest[j] += c[j];
@@ -348,10 +390,14 @@ static void planner_take(hsep_planner *self, const hsep_real x[])
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance)
 {
     const hsep_int n = self->solved.m;
-    const hsep_real *row = planner_triangle(self), *factor = hsep_at(self, self->factor);
-    const hsep_problem problem = planner_problem(self);
+    const hsep_real *row = planner_triangle(self);
+    const hsep_problem problem = hsep_planner_problem(self);
     hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low, *start = problem.high; /* work */
-
+    hsep_real *factor = hsep_at(self, self->factor);
+    memcpy(factor, row, (size_t)hsep_triangle(n) * sizeof(hsep_real));
+    if (!hsep_cholesky_rows(factor, n, 0, n, NULL)) {
+        return HSEP_PLAN_FAILED;
+    }
     memcpy(free_minimum, v, (size_t)n * sizeof(hsep_real));
     hsep_cholesky_solve(factor, n, free_minimum);
     planner_start(self, start);
@@ -386,10 +432,10 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tole
 
 HSEP_API int hsep_planner_advance(hsep_planner *self)
 {
-    if (!hsep_interior_advance(planner_interior(self), hsep_planner_splines(self), planner_triangle(self))) {
+    if (!hsep_interior_advance(hsep_part(self, self->interior), hsep_planner_splines(self), planner_triangle(self))) {
         return 0;
     }
-    const hsep_problem problem = planner_problem(self);
+    const hsep_problem problem = hsep_planner_problem(self);
     hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high, finite = 0.0;
     planner_start(self, at);
     for (hsep_int j = 0; j < self->solved.m; j++) {
@@ -401,26 +447,140 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
     planner_rows(self, way, rows);
     planner_rows(self, at, from);
     const hsep_real share = planner_share(self, from, rows);
-    for (hsep_int j = 0; j < self->solved.m;
-         j++) { /* bounds that are exceeded, as steps are limited, are so by little */
+    for (hsep_int j = 0; j < self->solved.m; j++) { /* bounds that are exceeded as steps are limited are so by little */
         way[j] = isfinite(finite) ? at[j] + share * way[j] : 0.0;
     }
     planner_take(self, way);
     return 1;
 }
 
+/* Stop behind decided and shared coefficients, in place, (count,) m. */
+static void stop_behind(const hsep_stop *self, hsep_real c[])
+{
+    const hsep_real *gains = hsep_at_const(self, self->gains);
+    hsep_int i = HSEP_N_DECIDED + self->shared;
+    hsep_real first = c[i - 1] - c[i - 2], second = first - (c[i - 2] - c[i - 3]);
+    for (; i < HSEP_N_DECIDED + self->n; i++, gains += 2) {
+        const hsep_real before = first;
+        first = gains[0] * first + gains[1] * second;
+        second = first - before;
+        c[i] = c[i - 1] + first;
+    }
+    for (; i < self->count; i++) {
+        c[i] = c[i - 1];
+    }
+}
+
+/* Rows of a change with coefficients c, (count,) m, in shares, (4 preview,). */
+static void stop_rows(const hsep_stop *self, const hsep_splines *splines, const hsep_real c[], hsep_real rows[])
+{
+    hsep_real now[HSEP_ORDERS] = {0.0};
+    for (hsep_int k = 0; k < self->preview; k++) {
+        hsep_splines_row(splines, now, hsep_splines_sum(splines, c, self->count, k), rows, self->preview, k);
+    }
+}
+
+/* Bounds of the rows of a change: what limits and command leave, and the last stop at least. */
+static void stop_bounds(hsep_stop *self, const hsep_planner *planner, const hsep_real x_d[])
+{
+    const hsep_splines *splines = hsep_planner_splines(planner);
+    const hsep_int preview = self->preview;
+    const hsep_real most = 1.0 - HSEP_QP_ROUNDING, *start = hsep_at(self, self->start);
+    hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
+    hsep_real path[HSEP_ORDERS], change[HSEP_ORDERS];
+    hsep_splines_exceeded(splines, x_d, planner->x_d_before, preview, low);
+    hsep_differ_from(path, planner->x_d_before);
+    hsep_differ_from(change, planner->delta_before);
+    for (hsep_int k = 0; k < preview; k++) {
+        hsep_differ(path, x_d[k]);
+        hsep_differ(change, 0.0);
+        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+            const hsep_int r = order * preview + k;
+            const hsep_real of_x_d = order > 0 ? path[order] : 0.0, exceeded = order > 0 ? low[r] : 0.0;
+            const hsep_real offset = (change[order] + of_x_d) * splines->share[order];
+            low[r] = hsep_fmin((hsep_fmin(exceeded, 0.0) - most) - offset, start[r]) - HSEP_QP_ROUNDING;
+            high[r] = hsep_fmax((hsep_fmax(exceeded, 0.0) + most) - offset, start[r]) + HSEP_QP_ROUNDING;
+        }
+    }
+}
+
+/* Find the share of the last stop's own part, nearest 0, with which all rows keep their bounds, so far on the way to
+ * the stop of the plan; return whether there is one. */
+static int stop_share(const hsep_stop *self, hsep_real length, hsep_real *share)
+{
+    const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);
+    const hsep_real *start = hsep_at_const(self, self->start), *way = hsep_at_const(self, self->way);
+    const hsep_real *own = hsep_at_const(self, self->own_rows);
+    hsep_real least = -INFINITY, most = INFINITY;
+    for (hsep_int r = 0; r < HSEP_ORDERS * self->preview; r++) {
+        const hsep_real row = start[r] + length * way[r];
+        if (hsep_fabs(own[r]) > HSEP_STOP_STILL) {
+            const hsep_real a = (low[r] - row) / own[r], b = (high[r] - row) / own[r];
+            least = hsep_fmax(least, hsep_fmin(a, b));
+            most = hsep_fmin(most, hsep_fmax(a, b));
+        } else if (!(row >= low[r] && row <= high[r])) {
+            return 0;
+        }
+    }
+    *share = hsep_fmin(hsep_fmax(0.0, least), most);
+    return least <= most;
+}
+
 HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self)
 {
-    const hsep_stop *stop = (const hsep_stop *)hsep_at_const(self, self->stop);
+    const hsep_stop *stop = hsep_part_const(self, self->stop);
     return self->stop > 0 ? HSEP_STOP_WORK * (hsep_real)stop->preview : 0.0;
 }
 
-HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[])
+HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[])
 {
-    if (self->stop > 0) {
-        const hsep_stop_task task = {.x_d = x_d, .x_d_before = self->x_d_before, .delta_before = self->delta_before};
-        hsep_stop_carry_out(
-            (hsep_stop *)hsep_at(self, self->stop), hsep_planner_splines(self), &task, hsep_at(self, self->c));
+    if (planner->stop == 0) {
+        return;
+    }
+    hsep_stop *self = hsep_part(planner, planner->stop);
+    const hsep_splines *splines = hsep_planner_splines(planner);
+    hsep_real *plan = hsep_at(planner, planner->c);
+    const hsep_int first = HSEP_N_DECIDED + self->shared, rows = HSEP_ORDERS * self->preview;
+    const size_t shared = (size_t)first * sizeof(hsep_real);
+    hsep_real *last = hsep_at(self, self->last), *own = hsep_at(self, self->own), *now = hsep_at(self, self->now);
+    hsep_real *start = hsep_at(self, self->start), *way = hsep_at(self, self->way);
+    hsep_real *own_rows = hsep_at(self, self->own_rows), length = 1.0, share = 1.0;
+    int tries = 0;
+    memcpy(own, last, shared);
+    stop_behind(self, own);
+    for (hsep_int i = 0; i < self->count; i++) {
+        own[i] = last[i] - own[i];
+    }
+    memcpy(now, plan, shared);
+    stop_behind(self, now);
+    stop_rows(self, splines, last, start);
+    stop_bounds(self, planner, x_d);
+    stop_rows(self, splines, own, own_rows);
+    stop_rows(self, splines, now, way);
+    for (hsep_int r = 0; r < rows; r++) {
+        start[r] -= own_rows[r];
+        way[r] -= start[r];
+    }
+    for (; tries < HSEP_STOP_TRIES && !stop_share(self, length, &share); tries++) {
+        length *= HSEP_STOP_SHORTER;
+    }
+    if (tries == HSEP_STOP_TRIES) { /* the last stop goes on */
+        length = 0.0;
+        share = 1.0;
+    }
+    for (hsep_int i = 0; i < first; i++) {
+        last[i] += length * (plan[i] - last[i]);
+    }
+    stop_behind(self, last);
+    if (length < 1.0) { /* behind what is shared the change fades */
+        memcpy(plan, last, shared);
+        for (hsep_int i = first; i < HSEP_N_DECIDED + splines->n; i++) {
+            const hsep_real pole = self->pole;
+            plan[i] = 3.0 * pole * plan[i - 1] - 3.0 * pole * pole * plan[i - 2] + pole * pole * pole * plan[i - 3];
+        }
+    }
+    for (hsep_int i = 0; i < self->count; i++) {
+        last[i] += share * own[i];
     }
 }
 
@@ -441,6 +601,10 @@ HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
         c[i] = i + kept < n ? c[i + kept] : 0.0;
     }
     if (self->stop > 0) {
-        hsep_stop_next((hsep_stop *)hsep_at(self, self->stop), kept);
+        const hsep_stop *stop = hsep_part_const(self, self->stop);
+        hsep_real *last = hsep_at(self, self->stop + stop->last);
+        for (hsep_int i = 0; i < stop->count; i++) {
+            last[i] = last[i + kept < stop->count ? i + kept : stop->count - 1];
+        }
     }
 }

@@ -14,7 +14,6 @@
 #include "hsep_interior.h"
 #include "hsep_layout.h"
 #include "hsep_splines.h"
-#include "hsep_stop.h"
 
 typedef struct {
     hsep_int Np;                  /* samples of a window */
@@ -55,7 +54,13 @@ HSEP_ASSERT_WORDS(hsep_planner, 40);
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
 {
-    return (const hsep_splines *)hsep_at_const(self, self->splines);
+    return hsep_part_const(self, self->splines);
+}
+
+/* Where its programme is; x: the change that was found last. */
+static inline hsep_problem hsep_planner_problem(hsep_planner *self)
+{
+    return hsep_interior_problem(hsep_part(self, self->interior), hsep_planner_splines(self));
 }
 
 /* Coefficients of the plan, (3 + n,), m; until it is made, of the remainder of the last plan. */
@@ -71,7 +76,8 @@ static inline hsep_real hsep_planner_delta(const hsep_planner *self, hsep_int k)
 typedef enum {
     HSEP_PLAN_FAILED = 0, /* no finite plan: the remainder of the last one is followed */
     HSEP_PLAN_DONE,
-    HSEP_PLAN_BOUNDED /* hsep_planner_advance is to be called until it returns 1 */
+    HSEP_PLAN_BOUNDED, /* hsep_planner_advance is to be called until it returns 1 */
+    HSEP_PLAN_OPEN     /* it is to be solved */
 } hsep_plan_status;
 
 HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters);
@@ -108,18 +114,12 @@ HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
  * with what makes it positive definite. */
 HSEP_API void hsep_planner_change(hsep_planner *self);
 static inline hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
-HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
+static inline hsep_real *hsep_planner_linear(hsep_planner *self) { return hsep_planner_problem(self).v; }
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight);
 
-/* Begin to plan at this cost; return whether it has a minimum. Cost: m^3 / 6 multiply-adds. */
-HSEP_API int hsep_planner_factor(hsep_planner *self);
-
 /* Plan at this cost, which is used up. The first samples (hsep_planner_pinned) stay as they are in a change of the last
- * plan, and in a bounded plan, which is solved within the tolerance. */
+ * plan, and in a bounded plan, which is solved within the tolerance. Cost: m^3 / 6 multiply-adds. */
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance);
-
-/* The change that was found last, (m,), m. */
-HSEP_API const hsep_real *hsep_planner_found(hsep_planner *self);
 
 /* Do a part of a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
 HSEP_API int hsep_planner_advance(hsep_planner *self);
@@ -129,7 +129,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self);
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[]);
 HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_real c[]);
 
-/* Shorten the plan, once it is made, to what keeps the limits whatever follows what is known (hsep_stop.h). x_d: as for
+/* Shorten the plan, once it is made, to what keeps the limits whatever follows what is known. x_d: as for
  * hsep_planner_open. */
 HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[]);
 

@@ -100,15 +100,8 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
     splines_change(self, c, first, rows);
     for (unsigned order = 1; order < HSEP_ORDERS; order++) {
         const hsep_real *of = rows + (order - 1) * preview;
-        hsep_real *to = rows + order * preview;
-        hsep_int k = 1;
-        to[0] = of[0];
-        for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
-            *hsep_lanes_at(to + k) = *hsep_lanes_const(of + k) - *hsep_lanes_const(of + k - 1);
-        }
-        for (; k < preview; k++) {
-            to[k] = of[k] - of[k - 1];
-        }
+        memcpy(rows + order * preview, of, (size_t)preview * sizeof(hsep_real));
+        hsep_axpy(rows + order * preview + 1, -1.0, of, preview - 1);
     }
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         hsep_real *row = rows + order * preview;
@@ -127,10 +120,8 @@ HSEP_API void hsep_splines_exceeded(
     const hsep_splines *self, const hsep_real x_d[], const hsep_real before[3], hsep_int count, hsep_real rows[])
 {
     const hsep_int near = 4 * self->spacing;
-    hsep_real now[HSEP_ORDERS] = {0.0};
-    for (int i = 0; i < 3; i++) {
-        hsep_differ(now, before[i]);
-    }
+    hsep_real now[HSEP_ORDERS];
+    hsep_differ_from(now, before);
     for (hsep_int k = 0; k < count; k++) {
         hsep_differ(now, x_d[k]);
         for (unsigned order = 1; order < HSEP_ORDERS; order++) {
@@ -242,12 +233,6 @@ HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self)
     return sum;
 }
 
-/* Entry (i, j), i <= j, of a triangle of n rows. */
-static hsep_real *splines_entry(hsep_real triangle[], hsep_int n, hsep_int i, hsep_int j)
-{
-    return triangle + i * n - i * (i + 1) / 2 + j; /* rows 0 ... i - 1 have n, n - 1, ... entries */
-}
-
 HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[])
 {
     const hsep_int n = self->n, spacing = self->spacing;
@@ -255,11 +240,12 @@ HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_re
         /* Columns j - d and j: sum over u of s(u + d spacing) s(u), up to where column j is cut off */
         hsep_real sum = 0.0;
         hsep_int u = 0;
-        for (hsep_int j = n; j-- > d;) {
+        for (hsep_int j = n; j-- > d;) { /* rows 0 ... i - 1 have n, n - 1, ... entries */
             for (; u + j * spacing < self->preview; u++) {
                 sum += filtered[u + d * spacing] * filtered[u];
             }
-            *splines_entry(triangle, n, j - d, j) = sum;
+            const hsep_int i = j - d;
+            triangle[i * n - i * (i - 1) / 2 + d] = sum;
         }
     }
 }

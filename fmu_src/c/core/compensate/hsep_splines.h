@@ -39,6 +39,26 @@ static inline void hsep_differ(hsep_real differences[HSEP_ORDERS], hsep_real val
     }
 }
 
+/* Differences at the last of three samples, from 0. */
+static inline void hsep_differ_from(hsep_real differences[HSEP_ORDERS], const hsep_real before[3])
+{
+    memset(differences, 0, HSEP_ORDERS * sizeof(hsep_real));
+    for (int i = 0; i < 3; i++) {
+        hsep_differ(differences, before[i]);
+    }
+}
+
+/* Rows of a change at sample k of count, from those at the sample before. */
+static inline void hsep_splines_row(
+    const hsep_splines *self, hsep_real differences[HSEP_ORDERS], hsep_real value, hsep_real rows[], hsep_int count,
+    hsep_int k)
+{
+    hsep_differ(differences, value);
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        rows[order * count + k] = differences[order] * self->share[order];
+    }
+}
+
 /* Splines that begin in a plan and end four samples before it does, or earlier. preview >= 4 spacing + 3. */
 static inline hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing)
 {
