@@ -284,7 +284,9 @@ class AveragedPlanning(Planning):
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         super().__init__(basis, bounds, settings, Np)
         self.weight = basis.weight
-        free = solved_splines(basis.n_free - self.n_pinned, Np // self.spacing)
+        # A plan that has faded as it had no stop may exceed limits where wide splines cannot leave it
+        n = basis.n_free - self.n_pinned
+        free = solved_splines(n, Np // self.spacing if self.horizon == settings.preview else n)
         self.splines = np.concatenate((np.zeros((self.n_pinned, free.shape[1])), free))
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:

@@ -20,7 +20,7 @@ HSEP_API hsep_real hsep_averaged_planner_lay_out(
     const hsep_real all = (hsep_real)parameters->n, coefficients = HSEP_N_DECIDED + (hsep_real)n,
                     filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
     const hsep_int n_pinned = hsep_planner_n_pinned(planner);
-    const hsep_int m = hsep_knots_of(n - n_pinned, planner->Np / planner->spacing).m;
+    const hsep_int m = hsep_knots_of(n - n_pinned, planner->window).m;
     const hsep_real preview = (hsep_real)planner->preview;
     hsep_real end = HSEP_WORDS(hsep_averaged_planner);
     self->preview = planner->preview;

@@ -65,7 +65,7 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_p
     self->Np = parameters->Np;
     self->n_pinned = hsep_planner_n_pinned(parameters);
     self->no_reversal = parameters->no_reversal != 0;
-    self->knots = hsep_knots_of(n - self->n_pinned, parameters->averaged ? parameters->Np / parameters->spacing : 0);
+    self->knots = hsep_knots_of(n - self->n_pinned, parameters->window);
     self->jerk_weight = parameters->jerk_weight;
     self->c = hsep_take(&end, HSEP_N_DECIDED + (hsep_real)n);
     self->total = hsep_take(&end, HSEP_ORDERS * preview);

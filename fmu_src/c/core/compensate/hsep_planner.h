@@ -24,7 +24,7 @@ typedef struct {
     hsep_real limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
     int no_reversal;              /* whether x_dm keeps the direction of x_d */
     hsep_int pinned;              /* samples that follow the last plan, or Np / 2 if less */
-    int averaged;                 /* whether plans are changes of the last one, by wider splines behind two windows */
+    hsep_int window; /* splines of one, behind two of which changes are solved for wider ones; 0: nowhere */
 } hsep_planner_parameters;
 
 typedef struct {

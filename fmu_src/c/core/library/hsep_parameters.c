@@ -129,7 +129,7 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
              settings->j_max * (T_s * T_s * T_s)},
         .no_reversal = settings->no_reversal != 0,
         .pinned = parameters->averaging.averaging ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER,
-        .averaged = parameters->averaging.averaging != 0};
+        .window = parameters->averaging.averaging && horizon == settings->preview ? Np / settings->spacing : 0};
     derived.compensate = (hsep_sep_state)settings->compensate;
     derived.error_max = settings->following_error_max;
     derived.n_lost = (hsep_int)parameters_samples(settings->measurement_timeout, T_s);
