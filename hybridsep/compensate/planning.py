@@ -108,10 +108,6 @@ class Planning(ABC):
         else:
             self.paused = max(0, self.paused - 1)
 
-    def adopt(self, bounds: DriveBounds, settings: CompensatorSettings) -> None:
-        """Plan within other bounds from the next window on; ``preview`` and ``spacing`` are the same."""
-        self.bounds, self.settings = bounds, settings
-
     @abstractmethod
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the best available plan on a model up to ``most``."""
@@ -289,10 +285,14 @@ class AveragedPlanning(Planning):
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the allowed plan that the averaged model judges best; before it has learned, the physics model's."""
+        averaged, state, previous_plan = predictor.residual, predictor.state, preview.previous_plan
+        assert isinstance(averaged, AveragedModel)
         assert predictor.start is not None
         path = preview.command - predictor.start
-        model = self._model(predictor, path, preview)
-        previous_plan, scales = preview.previous_plan, model.scales
+        with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
+            x_d = path + self.basis.delta(previous_plan)
+            model = PlanModel(averaged, state.physics, state.late, predictor.start, x_d, path, preview.load)
+        scales = model.scales  # of the remainder of the last plan
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, self.without_model(preview), scales)
         g, free = predictor.physics_operator(self.horizon)
@@ -339,13 +339,3 @@ class AveragedPlanning(Planning):
         if most is SepState.HYBRID:
             return PublishedPosition(prediction.x_h, prediction.x_h_std, prediction.n_warm_up, n_followed)
         return PublishedPosition(prediction.x_pb.copy(), np.zeros(Np), Np, n_followed)
-
-    def _model(self, predictor: HybridPredictor, path: Array, preview: Preview) -> PlanModel:
-        """Return the averaged model over the preview, with the scales of the remainder of the last plan."""
-        averaged = predictor.residual
-        assert isinstance(averaged, AveragedModel)
-        assert predictor.start is not None
-        with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
-            x_d = path + self.basis.delta(preview.previous_plan)
-            state = predictor.state
-            return PlanModel(averaged, state.physics, state.late, predictor.start, x_d, path, preview.load)
