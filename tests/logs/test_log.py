@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from log_files import EVERY_FORMAT, FORMATS, columns, write, write_csv
+from log_files import EVERY_FORMAT, FORMATS, columns, refused, write, write_csv
 from places import EMPS
 from properties import examples
 
@@ -49,42 +49,32 @@ def test_every_format_gives_the_same_log_by_its_content(tmp_path: Path, suffix: 
 )
 def test_formats_without_a_reader(tmp_path: Path, content: bytes, message: str) -> None:
     (tmp_path / "file").write_bytes(content)
-    with pytest.raises(LogError, match=message):
-        read_log(tmp_path / "file")
+    refused(message, tmp_path / "file")
     (tmp_path / "log.mat").write_bytes(bytes(range(256)))
-    with pytest.raises(LogError, match=r"log\.mat: is truncated, damaged or not a MATLAB"):
-        read_log(tmp_path / "log.mat")
+    refused(r"log\.mat: is truncated, damaged or not a MATLAB", tmp_path / "log.mat")
     (tmp_path / "log.csv").write_bytes(bytes(range(256)) * 20)
-    with pytest.raises(LogError, match=r"log\.csv: is binary, though its name says text"):
-        read_log(tmp_path / "log.csv")
+    refused(r"log\.csv: is binary, though its name says text", tmp_path / "log.csv")
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"none\.csv: there is no such file"):
-        read_log(tmp_path / "none.csv")
+    refused(r"none\.csv: there is no such file", tmp_path / "none.csv")
     (tmp_path / "folder.csv").mkdir()
-    with pytest.raises(LogError, match=r"folder\.csv: is not a file"):
-        read_log(tmp_path / "folder.csv")
+    refused(r"folder\.csv: is not a file", tmp_path / "folder.csv")
     for suffix in (".csv", ".npz", ".mat"):
         path = tmp_path / f"empty{suffix}"
         path.touch()
-        with pytest.raises(LogError, match="the file is empty"):
-            read_log(path)
-    with pytest.raises(LogError, match=r"\.csv: (cannot be read: File name too long|there is no such file)"):
-        read_log(tmp_path / ("long" * 100 + ".csv"))
-    with pytest.raises(LogError, match="the file is empty, a line of column names was expected"):
-        read_log(write_csv(tmp_path / "blank.csv", "\n\n"))
+        refused("the file is empty", path)
+    refused(r"\.csv: (cannot be read: File name too long|there is no such file)", tmp_path / ("long" * 100 + ".csv"))
+    refused("the file is empty, a line of column names was expected", write_csv(tmp_path / "blank.csv", "\n\n"))
 
 
-@pytest.mark.parametrize(
-    ("suffix", "kept"), [(suffix, kept) for suffix in (".npz", ".mat", ".json") for kept in (0.01, 0.99)]
-)
+@pytest.mark.parametrize("suffix", [".npz", ".mat", ".json", ".csv.gz"])
+@pytest.mark.parametrize("kept", [0.01, 0.3, 0.99])
 def test_truncated_files(tmp_path: Path, suffix: str, kept: float) -> None:
-    path = write(tmp_path / f"log{suffix}", columns(500))
+    path = write(tmp_path / f"log{suffix}", columns(3000))
     data = path.read_bytes()
     path.write_bytes(data[: max(1, int(kept * len(data)))])
-    with pytest.raises(LogError, match=rf"log\{suffix}: is truncated, damaged or not"):
-        read_log(path)
+    refused(rf"log\{suffix}: is truncated(, damaged or not| or damaged( after line \d+)?: )", path)
 
 
 @FORMATS
@@ -95,8 +85,7 @@ def test_too_short(tmp_path: Path, suffix: str, n: int, came: str, T_s: float | 
     if T_s is not None:
         del data["t"]
     path = write(tmp_path / f"log{suffix}", data)
-    with pytest.raises(LogError, match=f"a log needs at least 2 samples, got {came}"):
-        read_log(path, T_s=T_s)
+    refused(f"a log needs at least 2 samples, got {came}", path, T_s=T_s)
 
 
 # Times
@@ -125,15 +114,13 @@ def time_at(i: int, value: float) -> Array:
 )
 def test_bad_time(tmp_path: Path, t: Array, message: str) -> None:
     path = write(tmp_path / "log.npz", {"t": t, "x_d": t * 0, "x": t * 0})
-    with pytest.raises(LogError, match=message):
-        read_log(path)
+    refused(message, path)
 
 
 def test_given_ts_must_agree_with_the_time(tmp_path: Path) -> None:
     path = write(tmp_path / "log.csv", columns())
     assert read_log(path, T_s=1.005e-3).T_s == 1.005e-3
-    with pytest.raises(LogError, match=r"T_s = 0.002 s was given, but column 't' has an interval of 0.001 s"):
-        read_log(path, T_s=2e-3)
+    refused(r"T_s = 0.002 s was given, but column 't' has an interval of 0.001 s", path, T_s=2e-3)
     with pytest.raises(ParameterError, match="T_s must be 1e-05 … 1 s, got -1"):
         read_log(path, T_s=-1.0)
 

@@ -15,7 +15,9 @@ import pyarrow.parquet as pq
 import pytest
 from scipy import io
 
+from hybridsep.base.errors import LogError
 from hybridsep.base.signals import Array
+from hybridsep.logs.log import read_log
 
 Columns = dict[str, Any]
 
@@ -151,6 +153,12 @@ def write(path: Path, data: Columns) -> Path:
         text = "\n".join([",".join(data), *(",".join(map(repr, map(float, row))) for row in rows)]) + "\n"
         path.write_bytes(gzip.compress(text.encode()) if path.suffix == ".gz" else text.encode())
     return path
+
+
+def refused(message: str, recording: Any, **how: Any) -> None:
+    """Check that a log is refused with a message."""
+    with pytest.raises(LogError, match=message):
+        read_log(recording, **how)
 
 
 def _rated(data: Columns) -> dict[str, tuple[float, Any]]:
