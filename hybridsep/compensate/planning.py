@@ -76,10 +76,7 @@ class PublishedPosition(NamedTuple):
 
 
 class Planning(ABC):
-    """Plans with a residual model.
-
-    ``settings``: of the window: ``preview`` and ``spacing`` are given.
-    """
+    """Plans with a residual model."""
 
     PINNED: ClassVar[int]  # leading samples of a window in which a plan follows the last one, if limits bound it
     SOLVED: ClassVar[Tolerance]  # to which programmes are solved
@@ -87,11 +84,8 @@ class Planning(ABC):
     pause: int  # and after its next plan that runs away
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
-        assert settings.preview is not None
-        assert settings.spacing is not None
-        self.basis, self.bounds, self.settings = basis, bounds, settings
-        self.horizon, self.spacing = basis.preview, settings.spacing
-        self.Np = Np
+        self.basis, self.bounds, self.settings, self.Np = basis, bounds, settings, Np
+        self.horizon, self.spacing = basis.preview, basis.spacing
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
         self.weight: Array | None = None  # (horizon,): of the errors of a plan; without it all count alike
         # (n_free, m): splines that a plan changes the last one by, none of them pinned; without it all at once
