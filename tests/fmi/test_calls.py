@@ -278,9 +278,6 @@ def test_status_functions(fmu2: Library) -> None:
 def test_log_categories_can_be_switched(fmu: Library) -> None:
     instance = fmu.instantiate(logging_on=True)
 
-    def switch(on: bool, *categories: bytes | None) -> None:
-        assert fmu.SetDebugLogging(instance, on, len(categories), (c_char_p * len(categories))(*categories)) == OK
-
     def heard() -> list[str]:
         fmu.messages.clear()
         fmu.do_step(instance, 0.0, 1e-3)
@@ -302,7 +299,7 @@ def test_log_categories_can_be_switched(fmu: Library) -> None:
         (False, (b"logAll",), []),
         (True, (), everything),
     ):
-        switch(on, *categories)
+        assert fmu.SetDebugLogging(instance, on, len(categories), (c_char_p * len(categories))(*categories)) == OK
         assert heard() == expected
     fmu.refused(fmu.SetDebugLogging(instance, True, 1, None), "categories is NULL")
     fmu.FreeInstance(instance)
