@@ -131,8 +131,7 @@ def test_mat_that_is_not_a_plain_matrix(tmp_path: Path, value: object, message: 
     ],
 )
 def test_bad_arrays(tmp_path: Path, suffix: str, bad: Columns, message: str) -> None:
-    path = write(tmp_path / f"log{suffix}", columns() | bad)
-    refused(message, path)
+    refused(message, write(tmp_path / f"log{suffix}", columns() | bad))
 
 
 # Parquet
@@ -141,8 +140,7 @@ def test_bad_arrays(tmp_path: Path, suffix: str, bad: Columns, message: str) -> 
 def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "log.parquet", columns())
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    message = r"log.parquet: is a Parquet file, which needs the extra parquet: pip install 'hybridsep\[parquet\]'$"
-    refused(message, path)
+    refused(r"log.parquet: is a Parquet file, which needs the extra parquet: pip install 'hybridsep\[parquet\]'$", path)
 
 
 def test_nulls_times_structs_and_decimals(tmp_path: Path) -> None:

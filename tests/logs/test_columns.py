@@ -68,8 +68,7 @@ def test_a_time_beside_each_channel(tmp_path: Path) -> None:
         assert log.T_s == 1e-3
         np.testing.assert_array_equal(log.x_meas, np.arange(30) / 4)
     stamps = "".join(f"12:00:0{k}.5;{k};12:00:0{k}.5;{k}\n" for k in range(9))
-    path = write_csv(tmp_path / "log.csv", f"Uhr;x_d;Uhr;x\n{stamps}")
-    assert read_log(path).T_s == 1.0
+    assert read_log(write_csv(tmp_path / "log.csv", f"Uhr;x_d;Uhr;x\n{stamps}")).T_s == 1.0
 
 
 @pytest.mark.parametrize("name", ["trace.t", "trace.time [s]", "t", "tick"])
@@ -96,8 +95,7 @@ def test_columns_in_a_struct_are_guessed_beside_those_that_are_named(tmp_path: P
     ],
 )
 def test_a_german_log(tmp_path: Path, names: str) -> None:
-    text = f"Zeit [ms];{names}\n0;1,5;1\n2;2;1,5\n"
-    log = read_log(write_csv(tmp_path / "log.csv", text))
+    log = read_log(write_csv(tmp_path / "log.csv", f"Zeit [ms];{names}\n0;1,5;1\n2;2;1,5\n"))
     np.testing.assert_allclose((*log.t, *log.x_d, *log.x_meas), (0, 2e-3, 1.5e-3, 2e-3, 1e-3, 1.5e-3))
 
 

@@ -84,8 +84,7 @@ def test_too_short(tmp_path: Path, suffix: str, n: int, came: str, T_s: float | 
     data = columns(n)
     if T_s is not None:
         del data["t"]
-    path = write(tmp_path / f"log{suffix}", data)
-    refused(f"a log needs at least 2 samples, got {came}", path, T_s=T_s)
+    refused(f"a log needs at least 2 samples, got {came}", write(tmp_path / f"log{suffix}", data), T_s=T_s)
 
 
 # Times
@@ -113,8 +112,7 @@ def time_at(i: int, value: float) -> Array:
     ],
 )
 def test_bad_time(tmp_path: Path, t: Array, message: str) -> None:
-    path = write(tmp_path / "log.npz", {"t": t, "x_d": t * 0, "x": t * 0})
-    refused(message, path)
+    refused(message, write(tmp_path / "log.npz", {"t": t, "x_d": t * 0, "x": t * 0}))
 
 
 def test_given_ts_must_agree_with_the_time(tmp_path: Path) -> None:
@@ -140,8 +138,7 @@ def test_the_interval_of_a_clock_that_jitters(
     t = np.arange(n) * 1e-3 + np.clip(numbers.normal(0.0, 1e-4, n), -4e-4, 4e-4)
     t = np.delete(t, numbers.integers(1, n - 1, rows_lost))
     t[n // 2 :] += 7.77  # recording stopped, and went on
-    path = write(tmp_path_factory.mktemp("jitter") / "log.npz", {"t": t, "x_d": t, "x": t})
-    T_s = read_log(path).T_s
+    T_s = read_log(write(tmp_path_factory.mktemp("jitter") / "log.npz", {"t": t, "x_d": t, "x": t})).T_s
     # Standard error of the mean: by two ends for each piece between gaps, √2 · 0.1 ms
     assert T_s == pytest.approx(1e-3, rel=5 * 0.1414 * np.sqrt(rows_lost + 2) / (n - rows_lost))
     if rows_lost == 0 and n > 15_000:
@@ -160,8 +157,7 @@ def test_an_interval_that_is_not_round_stays(tmp_path: Path) -> None:
 
 
 def test_a_median_between_two_intervals_that_differ_much(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "log.csv", "t,x_d,x\n0,0,0\n1,0,0\n11,0,0\n")
-    assert read_log(path).T_s == 5.5
+    assert read_log(write_csv(tmp_path / "log.csv", "t,x_d,x\n0,0,0\n1,0,0\n11,0,0\n")).T_s == 5.5
 
 
 def test_recorded_axis() -> None:
@@ -324,8 +320,7 @@ def test_how_many_rows_are_lost_must_be_told(tmp_path: Path) -> None:
     """By a clock that jitters as well; but half a row is none, and another segment begins."""
     keep = np.delete(np.arange(N), np.arange(50, 550, 20))
     jitter = np.random.default_rng(0).uniform(-2e-4, 2e-4, len(keep))
-    path = write(tmp_path / "log.npz", {"t": 1e-3 * keep + jitter, "x_d": X_D[keep], "x": X[keep]})
-    log = read_log(path)
+    log = read_log(write(tmp_path / "log.npz", {"t": 1e-3 * keep + jitter, "x_d": X_D[keep], "x": X[keep]}))
     assert (log.starts, len(log.t), np.isnan(log.x_meas).sum()) == ((0,), N, 25)
     t = 1e-3 * np.arange(N)
     t[300:] += 1.2e-3
@@ -336,8 +331,7 @@ def test_resampled_by_an_option(tmp_path: Path) -> None:
     t = 1e-3 * np.arange(N)
     keep = np.delete(np.arange(N), [100, 200, 201])
     uneven = t + 2e-4 * np.sin(np.arange(N))
-    path = write(tmp_path / "log.npz", {"t": uneven[keep], "x_d": X_D[keep], "x": X[keep]})
-    log = read_log(path, resample=True)
+    log = read_log(write(tmp_path / "log.npz", {"t": uneven[keep], "x_d": X_D[keep], "x": X[keep]}), resample=True)
     missing = np.flatnonzero(np.isnan(log.x_meas))
     assert (log.starts, missing.tolist()) == ((0,), [100, 200, 201])
     log = read(tmp_path, uneven, resample=True)
