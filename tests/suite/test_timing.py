@@ -6,7 +6,6 @@ run in steps of ``T_s`` that gets the inputs so latched must show the same outpu
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
 from fractions import Fraction
 from itertools import accumulate, pairwise
 
@@ -87,35 +86,30 @@ def test_outputs_are_those_of_the_last_instant(new_stream: StreamMaker, pattern:
         assert shown == truth, f"{float(point)} samples"
 
 
-def _whole_nanoseconds(n: int, T_s: float) -> Array:
-    return np.arange(n, dtype=np.float64) * (round(T_s * 1e9) * 1e-9)
-
-
-def _single_precision(n: int, T_s: float) -> Array:
-    return (99.0 + np.arange(n) * T_s).astype(np.float32).astype(np.float64)
-
-
-def _sum_of_steps(n: int, T_s: float) -> Array:
-    return np.cumsum(np.full(n, T_s))
+THIRD = 1 / 3000  # s
 
 
 @pytest.mark.parametrize(
-    ("times_of", "T_s", "warned"),
-    [(_whole_nanoseconds, 1 / 3000, 0), (_single_precision, 1 / 3000, 1), (_sum_of_steps, 1 / 3000, 0)],
+    ("times", "warned"),
+    [
+        (np.arange(301) * (round(THIRD * 1e9) * 1e-9), 0),
+        ((99.0 + np.arange(301) * THIRD).astype(np.float32).astype(np.float64), 1),
+        (np.cumsum(np.full(301, THIRD)), 0),
+    ],
+    ids=["whole nanoseconds", "single precision", "sum of steps"],
 )
 @on_adapters((PREDICTOR, COMPENSATOR))
 def test_figures_with_an_importers_times_are_those_of_exact_steps(
-    new_stream: StreamMaker, times_of: Callable[[int, float], Array], T_s: float, warned: int
+    new_stream: StreamMaker, times: Array, warned: int
 ) -> None:
     """Every sample arrives once: the same outputs to the last bit; rounding of single precision is said once."""
-    times = times_of(301, T_s)
     runs = []
     for exact in (True, False):
-        stream = new_stream.begun(times[0], T_s=T_s)
+        stream = new_stream.begun(times[0], T_s=THIRD)
         outputs = []
         for k, (t, h) in enumerate(zip(times[:-1], np.diff(times), strict=True)):
             set_inputs(stream, k * T_S)
-            stream.step(*((times[0] + k * T_s, T_s) if exact else (float(t), float(h))))
+            stream.step(*((times[0] + k * THIRD, THIRD) if exact else (float(t), float(h))))
             outputs.append(stream.outputs())
         runs.append(outputs)
     assert runs[0] == runs[1]
@@ -269,9 +263,6 @@ def test_plants_move_the_same_in_any_steps(new_stream: StreamMaker, step: str) -
     n = min(map(len, runs))
     np.testing.assert_allclose(runs[0][:n], runs[1][:n], rtol=0, atol=1e-9)
     assert np.ptp(runs[0]) > 1e-3
-
-
-THIRD = 1 / 3000  # s
 
 
 @pytest.mark.parametrize("step", [333_333e-9, float(np.float32(THIRD)), 0.1 + THIRD - 0.1])
