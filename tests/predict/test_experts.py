@@ -165,9 +165,7 @@ def test_the_minimum_meets_its_optimality_conditions(n: int, rank: int, ridge: f
 
 
 def test_a_singular_problem_has_a_minimum() -> None:
-    twice = np.full((2, 2), 2.0)
-    found = simplex_minimum(twice, np.array([1.0, 1.0]))
-    assert found.sum() == pytest.approx(0.5)
+    assert simplex_minimum(np.full((2, 2), 2.0), np.array([1.0, 1.0])).sum() == pytest.approx(0.5)
     np.testing.assert_array_equal(simplex_minimum(np.zeros((2, 2)), np.array([-1.0, -1.0])), 0.0)
 
 
