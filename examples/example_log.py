@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hybridsep import Limits, ModalModel, Mode, read_log, rest_to_rest, simulate
-from hybridsep.base.files import atomic_open
+from hybridsep.base.files import write_whole
 from hybridsep.base.signals import Array
 from hybridsep.logs.formats import EXAMPLE
 from hybridsep.plants.stage_drive import StageDrive
@@ -71,8 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if parser.parse_args(arguments).write:
         text = io.StringIO()
         np.savetxt(text, made, delimiter=",", fmt=("%.3f", "%.4f", "%.4f"), header=HEAD, comments="")
-        with atomic_open(EXAMPLE) as file:
-            file.write(gzip.compress(text.getvalue().encode(), 9, mtime=0))
+        write_whole(EXAMPLE, gzip.compress(text.getvalue().encode(), 9, mtime=0))
     log = read_log(EXAMPLE)
     shipped = np.column_stack((log.t, 1e3 * log.x_d, 1e3 * log.x_meas))
     print(f"{EXAMPLE}: {EXAMPLE.stat().st_size / 1e3:.0f} kB, differs by {1e3 * np.abs(shipped - made).max():.2g} µm")

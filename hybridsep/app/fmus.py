@@ -162,7 +162,7 @@ def hal(
     The component (compensator, or predictor) is the same for all machines; each axis has a folder of its name that
     ``loadrt hsep axes=`` takes.
     """
-    from ..base.files import atomic_open
+    from ..base.files import write_whole
     from ..fmi.controllers import COMPONENTS, axis_files, check_names, component_files
     from ..fmi.weights import WEIGHTS_FILE, saved_weights
     from ..machines.machine import load_machine
@@ -189,8 +189,7 @@ def hal(
     changed = [path for path, content in files.items() if not (path.is_file() and path.read_bytes() == content)]
     check_outputs([("--out", path, ()) for path in (*changed, *stale)], {"saved predictor": weights}, force=force)
     for path, content in files.items():
-        with atomic_open(path) as file:
-            file.write(content)
+        write_whole(path, content)
     if not predictor:
         warn_of_estimates(axes)
     for path in stale:
@@ -216,7 +215,7 @@ def header(
     The library is fmu_src/c: a compensator, or a predictor, for a controller that runs no FMU. The header has the
     axis's modes, settings and, with ``--weights``, what an earlier run has learned.
     """
-    from ..base.files import atomic_open_text
+    from ..base.files import write_whole
     from ..fmi.controllers import axis_header
     from ..fmi.weights import saved_weights
     from ..machines.machine import load_machine, machine_path
@@ -230,6 +229,5 @@ def header(
     check_outputs([("--out", path, (".h",))], inputs, force=force)
     if not predictor:
         warn_of_estimates([axis])
-    with atomic_open_text(path) as file:
-        file.write(text)
+    write_whole(path, text)
     typer.echo(f"{path} written: include it after installing the library, whose README.md says how (fmu_src/c)")

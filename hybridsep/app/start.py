@@ -81,7 +81,7 @@ def init(
 
     Of a lag of 6 ms; hybridsep fit finds what an axis is from its log.
     """
-    from ..base.files import atomic_open_text
+    from ..base.files import write_whole
     from ..identify.model import machine_of
     from ..identify.structure import lag_mode
     from ..machines.machine import machine_name, machine_text
@@ -98,6 +98,5 @@ def init(
         f"Next: hybridsep backtest LOG --machine {out}",
     ]
     more = Path(__file__).with_name("more_sections.toml")  # which a machine file may have besides
-    with atomic_open_text(out) as file:
-        file.write(machine_text(machine, comments, annotated=True) + more.read_text(encoding="utf-8"))
+    write_whole(out, machine_text(machine, comments, annotated=True) + more.read_text(encoding="utf-8"))
     typer.echo(f"{out} written: a lag, tau = {_LAG:g}; edit it")

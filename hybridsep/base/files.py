@@ -82,6 +82,12 @@ def atomic_open_text(path: str | Path) -> Iterator[IO[str]]:
         text.detach()  # what is buffered goes to the file, which stays open
 
 
+def write_whole(path: str | Path, content: bytes | str) -> None:
+    """Write a file of bytes, or of UTF-8 text, as :func:`atomic_open` does."""
+    with atomic_open(path) as file:
+        file.write(content.encode() if isinstance(content, str) else content)
+
+
 def plain(value: Any) -> Any:
     """Return records as plain values for JSON: fields by their names, None for a figure that is not finite."""
     if is_dataclass(value):

@@ -146,9 +146,8 @@ class SepCompensator:
         if changed != self.settings:
             self.settings = changed
             self.monitor.error_max = changed.following_error_max
-            bounds = self._bounds(changed)
-            self._planning.adopt(bounds, changed)
-            self._stop = self._stop_within(bounds)
+            self._planning.bounds, self._planning.settings = self._bounds(changed), changed
+            self._stop = self._stop_within(self._planning.bounds)
 
     @property
     def T_s(self) -> float:

@@ -161,16 +161,12 @@ class PlanModel:
                 continue
             shrinkage = weight * _left(at.predictions[expert])[n_late:, None]
             if expert.like(self._model).target == COMMAND_RESIDUAL:
-                acted = self._late_changes(changes)
+                # As late as the command's expert takes them
+                acted = np.pad(changes, ((self._model.command.dead_time, 0), (0, 0)))[: len(changes)]
                 total += shrinkage * self._of_command(one, acted) + weight * (acted - passed)
             else:
                 total += shrinkage * self._of_disturbances(one, slopes, changes, passed)
         return total
-
-    def _late_changes(self, changes: Array) -> Array:
-        """Return changes of the commands as late as the command's expert takes them, ``(n, m)``, m."""
-        d = min(self._model.command.dead_time, len(changes))
-        return np.concatenate((np.zeros_like(changes[:d]), changes[: len(changes) - d]))
 
     def _of_command(self, solved: SolvedExpert, acted: Array) -> Array:
         """Return the change of the command's residual with such late changes of the commands, ``(n, m)``."""

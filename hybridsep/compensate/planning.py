@@ -76,10 +76,7 @@ class PublishedPosition(NamedTuple):
 
 
 class Planning(ABC):
-    """Plans with a residual model.
-
-    ``settings``: of the window: ``preview`` and ``spacing`` are given.
-    """
+    """Plans with a residual model."""
 
     PINNED: ClassVar[int]  # leading samples of a window in which a plan follows the last one, if limits bound it
     SOLVED: ClassVar[Tolerance]  # to which programmes are solved
@@ -87,11 +84,8 @@ class Planning(ABC):
     pause: int  # and after its next plan that runs away
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
-        assert settings.preview is not None
-        assert settings.spacing is not None
-        self.basis, self.bounds, self.settings = basis, bounds, settings
-        self.horizon, self.spacing = basis.preview, settings.spacing
-        self.Np = Np
+        self.basis, self.bounds, self.settings, self.Np = basis, bounds, settings, Np
+        self.horizon, self.spacing = basis.preview, basis.spacing
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
         self.weight: Array | None = None  # (horizon,): of the errors of a plan; without it all count alike
         # (n_free, m): splines that a plan changes the last one by, none of them pinned; without it all at once
@@ -107,10 +101,6 @@ class Planning(ABC):
             self.paused, self.pause = self.pause, 2 * self.pause
         else:
             self.paused = max(0, self.paused - 1)
-
-    def adopt(self, bounds: DriveBounds, settings: CompensatorSettings) -> None:
-        """Plan within other bounds from the next window on; ``preview`` and ``spacing`` are the same."""
-        self.bounds, self.settings = bounds, settings
 
     @abstractmethod
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
@@ -291,10 +281,14 @@ class AveragedPlanning(Planning):
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the allowed plan that the averaged model judges best; before it has learned, the physics model's."""
+        averaged, state, previous_plan = predictor.residual, predictor.state, preview.previous_plan
+        assert isinstance(averaged, AveragedModel)
         assert predictor.start is not None
         path = preview.command - predictor.start
-        model = self._model(predictor, path, preview)
-        previous_plan, scales = preview.previous_plan, model.scales
+        with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
+            x_d = path + self.basis.delta(previous_plan)
+            model = PlanModel(averaged, state.physics, state.late, predictor.start, x_d, path, preview.load)
+        scales = model.scales  # of the remainder of the last plan
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, self.without_model(preview), scales)
         g, free = predictor.physics_operator(self.horizon)
@@ -341,13 +335,3 @@ class AveragedPlanning(Planning):
         if most is SepState.HYBRID:
             return PublishedPosition(prediction.x_h, prediction.x_h_std, prediction.n_warm_up, n_followed)
         return PublishedPosition(prediction.x_pb.copy(), np.zeros(Np), Np, n_followed)
-
-    def _model(self, predictor: HybridPredictor, path: Array, preview: Preview) -> PlanModel:
-        """Return the averaged model over the preview, with the scales of the remainder of the last plan."""
-        averaged = predictor.residual
-        assert isinstance(averaged, AveragedModel)
-        assert predictor.start is not None
-        with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
-            x_d = path + self.basis.delta(preview.previous_plan)
-            state = predictor.state
-            return PlanModel(averaged, state.physics, state.late, predictor.start, x_d, path, preview.load)

@@ -278,7 +278,7 @@ class DriveBounds:
 def solve(
     cost: PlanCost, bounds: Bounds, previous_plan: Array, n_pinned: int, *, tolerance: Tolerance = EXACT
 ) -> Minimum | None:
-    """Return the minimiser of the cost within the bounds.
+    """Return the minimiser of the cost within the bounds, as far as it is feasible from the last plan, and its steps.
 
     The unconstrained minimiser if it is feasible. Otherwise the first ``n_pinned`` coefficients stay as they are in
     ``previous_plan``: a real-time implementation solves for the others while the pinned ones act.
@@ -295,8 +295,25 @@ def solve(
         return None
     if bounds.allow(c):
         return Minimum(c, 0)
-    scale = float(cost.v @ c + previous_plan @ cost.P @ previous_plan)
-    return _bounded(cost, bounds, previous_plan, n_pinned, scale, tolerance)
+    pinned, problem = previous_plan[:n_pinned], cost.without(previous_plan[:n_pinned])
+    rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
+    touched = rows.any(axis=1)
+    found = minimise(
+        problem.P,
+        problem.v,
+        rows[touched],
+        (bounds.low - taken)[touched] + tolerance.margin,
+        (bounds.high - taken)[touched] - tolerance.margin,
+        previous_plan[n_pinned:],
+        float(cost.v @ c + previous_plan @ cost.P @ previous_plan),  # between the last plan and its minimiser
+        tolerance,
+    )
+    start = previous_plan if found.inner is None else np.concatenate((pinned, found.inner))
+    best = np.concatenate((pinned, found.x))
+    if not np.isfinite(best).all():
+        return found._replace(x=previous_plan)
+    # Bounds that are exceeded, as steps are limited, are so by little
+    return found._replace(x=start + bounds.step(start, best) * (best - start))
 
 
 def solve_change(
@@ -310,31 +327,3 @@ def solve_change(
     of_change = bounds.of_change(previous_plan, splines)
     found = solve(cost, of_change, np.zeros(splines.shape[1]), 0, tolerance=tolerance)
     return None if found is None else np.asarray(previous_plan + splines @ found.x)
-
-
-def _bounded(
-    cost: PlanCost, bounds: Bounds, previous_plan: Array, n_pinned: int, scale: float, tolerance: Tolerance
-) -> Minimum:
-    """Return the minimiser of the cost within the bounds, as far as it is feasible from the last plan, and its steps.
-
-    Parameters are those of :func:`solve`; ``scale``: of the cost, m², between ``previous_plan`` and its minimiser.
-    """
-    pinned, problem = previous_plan[:n_pinned], cost.without(previous_plan[:n_pinned])
-    rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
-    touched = rows.any(axis=1)
-    found = minimise(
-        problem.P,
-        problem.v,
-        rows[touched],
-        (bounds.low - taken)[touched] + tolerance.margin,
-        (bounds.high - taken)[touched] - tolerance.margin,
-        previous_plan[n_pinned:],
-        scale,
-        tolerance,
-    )
-    start = previous_plan if found.inner is None else np.concatenate((pinned, found.inner))
-    best = np.concatenate((pinned, found.x))
-    if not np.isfinite(best).all():
-        return found._replace(x=previous_plan)
-    # Bounds that are exceeded, as steps are limited, are so by little
-    return found._replace(x=start + bounds.step(start, best) * (best - start))

@@ -43,7 +43,7 @@ def solved_splines(n: int, window: int) -> Array:
     columns, begin, sums, window = [], 0, np.ones(1), max(window, 4)
     for apart, end in ((1, 2 * window), (2, 4 * window), (4, n)):
         while begin < end and begin + len(sums) <= n:
-            columns.append(_padded(np.concatenate((np.zeros(begin), sums)), n))
+            columns.append(np.pad(sums, (begin, n - begin - len(sums))))
             begin += apart
         begin -= 4 * apart  # the next ones overlap
         sums = np.convolve(np.kron(sums, (1.0, 0.0))[: 2 * len(sums) - 1], two_scale)
@@ -87,18 +87,17 @@ class SplineBasis:
         self.weight: Array = np.concatenate((np.ones(begin), np.maximum(_LEAST, falling)))
         self.n_free = (preview - width - _END) // spacing + 1
         spline = np.asarray(BSpline.basis_element(np.arange(5))(np.arange(width) / spacing))
+        self._spline: Array = np.pad(spline, (0, preview - width))
         # Tails of the splines at −3, −2, −1 spacings, then the free splines
-        tails = [_padded(spline[i * spacing :], preview) for i in (3, 2, 1)]
-        self._spline = _padded(spline, preview)
+        tails = [np.append(self._spline[i * spacing :], np.zeros(i * spacing)) for i in (3, 2, 1)]
         self.values: Array = np.column_stack((*tails, _shifts(self._spline, self.n_free, spacing)))
-        extended = np.concatenate((np.zeros((3, self.values.shape[1])), self.values))
         # Differences over the plan; the three samples before it enter by `before`
-        self.third: Array = np.diff(extended, 3, axis=0)
+        self.third: Array = np.diff(np.pad(self.values, ((3, 0), (0, 0))), 3, axis=0)
 
     def shifted(self, preview: int) -> Array:
         """Return all splines that act in a preview, which goes on behind it: a matrix ``(preview, 3 + n)``."""
         width, spacing = 4 * self.spacing, self.spacing
-        spline = _padded(self._spline[:width], preview + width)
+        spline = np.pad(self._spline[:width], (0, preview))
         tails = [spline[i * spacing : preview + i * spacing] for i in (3, 2, 1)]
         return np.column_stack((*tails, _shifts(spline[:preview], -(-preview // spacing), spacing)))
 
@@ -137,10 +136,6 @@ class SplineBasis:
             W, target = weight[:, None] * W, weight * target
         P = W.T @ W + jerk_weight * (D.T @ D)
         return PlanCost(P, W.T @ target - jerk_weight * (D.T @ third_decided))
-
-
-def _padded(samples: Array, n: int) -> Array:
-    return np.concatenate((samples, np.zeros(n - len(samples))))
 
 
 def _shifts(samples: Array, n: int, spacing: int) -> Array:

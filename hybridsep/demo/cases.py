@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.files import atomic_open_text
+from ..base.files import write_whole
 from ..base.metrics import shown_figure
 from ..cosim.compensated import COMPENSATED, Advance, Runs, compensate, mean_summary
 from ..cosim.contour import contours_of
@@ -150,8 +150,7 @@ def demo(
         summary |= spiral_case(out, advance)
     for name, case in summary.items():
         case["printed"] = PRINTED[name]
-    with atomic_open_text(out / "summary.json") as file:
-        file.write(json.dumps(summary, indent=2) + "\n")
+    write_whole(out / "summary.json", json.dumps(summary, indent=2) + "\n")
     write_page(out, summary, demo_files(out, full=full))
     progress("done", 1.0)
     return summary

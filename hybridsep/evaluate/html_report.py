@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.files import atomic_open_text
+from ..base.files import write_whole
 from ..base.signals import Indices
 
 if TYPE_CHECKING:
@@ -212,5 +212,4 @@ class Report:
         page = Template(template).substitute(
             title=html.escape(self.title), subtitle=html.escape(self.subtitle), body=body
         )
-        with atomic_open_text(path) as file:
-            file.write(page)
+        write_whole(path, page)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import IdentificationError, ParameterError, listed
-from ..base.files import atomic_open, atomic_open_text, plain
+from ..base.files import plain, write_whole
 from ..base.metrics import html_table, line_plot
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, CompensatorSettings, PredictorSettings
 from ..base.signals import Array, as_samples
@@ -206,12 +206,10 @@ class Fit:
         archives = {what: path for what, path in files.items() if path.suffix == ".fmu"}
         for what in [*([] if report else ["report"]), *([] if fmus else archives)]:
             del files[what]
-        with atomic_open_text(files["machine file"]) as file:
-            file.write(machine_text(self.machine, comments=self._comments()))
+        write_whole(files["machine file"], machine_text(self.machine, comments=self._comments()))
         commands = commands_to_try(self.judged.replay.recordings)
         write_commands(files["commands to try"], commands, self.machine.T_s, self.logs[0].shown)
-        with atomic_open(files["trained predictor"]) as state:
-            state.write(self.trained)
+        write_whole(files["trained predictor"], self.trained)
         for i, (what, path) in enumerate(archives.items() if fmus else ()):
             progress(f"build the {what}", i / len(archives))
             build_fmu(self.machine, path.stem, path.parent, weights=files["trained predictor"])
@@ -219,8 +217,8 @@ class Fit:
             self.report(files["report"], [path.name for path in archives.values() if fmus], in_position=in_position)
         hashes = {path.name: sha256_of(path) for what, path in files.items() if what != "results"}
         written = {"logs": [str(log.path.resolve()) for log in self.logs], "files": hashes}
-        with atomic_open_text(files["results"]) as file:
-            file.write(json.dumps({"hybridsep": __version__, **self.results(), "written": written}, indent=2) + "\n")
+        results = {"hybridsep": __version__, **self.results(), "written": written}
+        write_whole(files["results"], json.dumps(results, indent=2) + "\n")
         progress("done", 1.0)
         return files
 

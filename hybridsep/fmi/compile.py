@@ -28,7 +28,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ..base.errors import FmuError
-from ..base.files import atomic_open, data_folder, named_errors
+from ..base.files import data_folder, named_errors, write_whole
 from .c_header import KINDS, c_sources, fmi_headers, kind_header
 from .flavours import FMI_VERSIONS
 
@@ -211,9 +211,7 @@ def library_paths(
         }
         try:
             for i, (library, compiled) in enumerate(running.items(), start=1):
-                content = compiled.result()
-                with atomic_open(places[library]) as file:
-                    file.write(content)
+                write_whole(places[library], compiled.result())
                 on_library(library, i / len(running))
         finally:  # after a failure or Ctrl-C no other one begins
             pool.shutdown(cancel_futures=True)

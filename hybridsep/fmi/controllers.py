@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..base.errors import ParameterError
-from ..base.files import atomic_open_text, data_folder
+from ..base.files import data_folder, write_whole
 from ..base.version import __version__
 from ..machines.machine import Machine
 from .c_header import TABLE_FILE, c_bytes, c_sources, kind_header, table_file
@@ -116,6 +116,6 @@ def write_configuration(out: Path, fmi: str) -> Path:
     """
     excluded = sorted(name for name in c_sources((fmi,)) if name.endswith(".c") and name != "all.c")
     values = {"definitions": ";".join(DEFINITIONS), "excluded": ";".join(excluded)}
-    with atomic_open_text(out / CONFIGURATION_FILE) as file:  # the tool is the generationTool of modelDescription.xml
-        file.write(filled("CustomFMU.xml", tool=f"hybridsep {__version__}", **values))
+    tool = f"hybridsep {__version__}"  # the generationTool of modelDescription.xml
+    write_whole(out / CONFIGURATION_FILE, filled("CustomFMU.xml", tool=tool, **values))
     return out / CONFIGURATION_FILE

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError
-from ..base.files import atomic_open
+from ..base.files import write_whole
 from ..base.signals import as_samples
 from ..base.version import __version__
 from ..machines.machine import Machine
@@ -207,7 +207,6 @@ def build_system(
     delay = int(starts["Np" if compensate is None else "preview"] or 0)
     stop_time = round((len(samples) - 1 + delay) * machine.T_s, 9)
     structure = _structure(machine.name, components, connections, machine.T_s, stop_time, ssp)
-    with atomic_open(path) as file:
-        file.write(archived({"SystemStructure.ssd": structure, **content}))
+    write_whole(path, archived({"SystemStructure.ssd": structure, **content}))
     progress("done", 1.0)
     return Path(path)

@@ -76,9 +76,7 @@ def motion_split(segments: Sequence[Segment], fraction: float) -> list[Segment]:
 
 def delayed(u: Array, n: int) -> Array:
     """Return a command ``n`` samples later, at rest at its first value before."""
-    if n <= 0:
-        return u
-    return np.concatenate((np.full(min(n, len(u)), u[0]), u[: max(0, len(u) - n)]))
+    return np.pad(u, (max(n, 0), 0), mode="edge")[: len(u)]
 
 
 def in_time(x_d: Array, x: Array, n_late: int) -> tuple[Array, Array]:

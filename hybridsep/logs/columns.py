@@ -45,12 +45,11 @@ def choose_columns(
             raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, got {brief(role)}")
     given = dict(columns or {})
     chosen, remarks = _positions(source, given, axis)
-    own = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
-    chosen = {"t": own, **chosen}
-    if chosen["t"] is None and "t" not in given and time_needed:
-        chosen["t"] = _only_clock(source)
-    if chosen["t"] is None and "t" not in given and not time_needed:
-        del chosen["t"]
+    time = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
+    if time is None and "t" not in given and time_needed:
+        time = _only_clock(source)
+    if time is not None or "t" in given or time_needed:
+        chosen = {"t": time, **chosen}
     source.remarks = [*source.remarks, *remarks]
     found: dict[str, Column] = {}
     names = {role: name for role, name in chosen.items() if name is not None}
@@ -90,21 +89,20 @@ def _positions(source: Source, given: Mapping[str, str], axis: str | None) -> tu
     axes = source.axes or axes_of(source.names)
     chosen = {role: _name(source, role, given[role]) for role in ("x_d", "x") if role in given}
     if axis is not None:
-        found, remarks = _of_axis(source, axes, axis), list[str]()
-        pair: tuple[str | None, str | None] = found
-    else:
-        own = {} if source.axes else {role: _name(source, role, None) for role in ("x_d", "x") if role not in chosen}
-        left = [role for role in ("x_d", "x") if role not in chosen and own.get(role) is None]
-        partner = next((pair for pair in axes.values() if set(pair) & set(chosen.values())), None)
-        first = source.axis or next(iter(axes), None)
-        pair, remarks = (own.get("x_d"), own.get("x")), []
-        if partner is not None:
-            pair = partner
-        elif first is not None and left and (not chosen or len(axes) == 1):
-            pair = axes[first]
-        read = next((name for name, one in axes.items() if one == pair), None)
-        if len(axes) > 1 and read is not None and not chosen:
-            remarks = [f"axis {read} of {listed(list(axes), str)} is read; axis='…' (--axis) chooses another"]
+        x_d, x = _of_axis(source, axes, axis)
+        return {"x_d": x_d, "x": x, **chosen}, []
+    own = {} if source.axes else {role: _name(source, role, None) for role in ("x_d", "x") if role not in chosen}
+    left = [role for role in ("x_d", "x") if role not in chosen and own.get(role) is None]
+    partner = next((pair for pair in axes.values() if set(pair) & set(chosen.values())), None)
+    first = source.axis or next(iter(axes), None)
+    pair, remarks = (own.get("x_d"), own.get("x")), []
+    if partner is not None:
+        pair = partner
+    elif first is not None and left and (not chosen or len(axes) == 1):
+        pair = axes[first]
+    read = next((name for name, one in axes.items() if one == pair), None)
+    if len(axes) > 1 and read is not None and not chosen:
+        remarks = [f"axis {read} of {listed(list(axes), str)} is read; axis='…' (--axis) chooses another"]
     return {"x_d": pair[0], "x": pair[1], **chosen}, remarks
 
 

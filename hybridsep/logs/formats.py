@@ -8,7 +8,7 @@ import gzip
 from pathlib import Path
 
 from ..base.errors import LogError
-from ..base.files import atomic_open
+from ..base.files import write_whole
 from .arrays import MatSource, NpzSource, ParquetSource
 from .halscope import HalscopeSource
 from .sinumerik import CaptureSource, SinumerikSource
@@ -112,5 +112,4 @@ def _reader(path: Path, head: bytes) -> type[Source]:
 def write_example(path: Path) -> None:
     """Write the example log as CSV, or compressed where the name ends in ``.gz``."""
     packed = EXAMPLE.read_bytes()
-    with atomic_open(path) as file:
-        file.write(packed if path.suffix == ".gz" else gzip.decompress(packed))
+    write_whole(path, packed if path.suffix == ".gz" else gzip.decompress(packed))

@@ -366,15 +366,12 @@ def _at_sensor_phase(given: Log) -> tuple[Log, str]:
         for start, end in zip(given.starts, (*given.starts[1:], len(given.t)), strict=True):
             own = at[(at > start) & (at < end)]
             phase = int(np.bincount(own % n).argmax()) if len(own) else start % n
-            parts.append(np.arange(start + (phase - start) % n, end, n))
-        kept = [part for part in parts if len(part)]
-        starts = np.cumsum([0, *map(len, kept[:-1])])
+            parts.append(_at(given, np.arange(start + (phase - start) % n, end, n)))
         said = (
             f"the measured position is renewed every {n} samples ({100 * share:.4g} % of its changes come in one of "
             f"{n}): the samples in which it is new are taken, {n * given.T_s:g} s apart"
         )
-        new = _at(given, np.concatenate(kept))
-        return replace(new, T_s=n * given.T_s, starts=tuple(starts.tolist())), said
+        return replace(_joined([part for part in parts if len(part.t)]), T_s=n * given.T_s), said
     return given, ""
 
 

@@ -384,7 +384,8 @@ def _with_names(
         return None
     numeric = [i for i in range(len(above[0][1])) if not kinds[i]]  # hh:mm:ss may stand above timestamps
     has_units = len(above) > 1 and _is_row_of_units([above[0][1][i] for i in numeric])
-    header, names = _best_names(above[has_units:])
+    nearest = above[has_units:][:2]  # the one with more known names counts
+    header, names = max(nearest, key=lambda row: n_known(row[1]) if len(row[1]) == len(nearest[0][1]) else -1)
     units = dict(zip(names, above[0][1], strict=False)) if has_units else {}
     written = [text for row in fields for text, kind in zip(row, kinds, strict=False) if not kind and _is_written(text)]
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
@@ -404,11 +405,6 @@ def _comma(numbers: Sequence[str]) -> str | None:
     if commas and all(map(_THOUSANDS.fullmatch, commas)) and (points or any(text.count(",") > 1 for text in commas)):
         return ""
     return None if points else "."
-
-
-def _best_names(above: Sequence[tuple[int, list[str]]]) -> tuple[int, list[str]]:
-    """Return line and names, of the two rows above the numbers that with more known ones."""
-    return max(above[:2], key=lambda row: n_known(row[1]) if len(row[1]) == len(above[0][1]) else -1)
 
 
 def _are_row_names(cells: Sequence[str]) -> bool:

@@ -99,10 +99,9 @@ class TwinCatSource(ArraysSource):
             places[name] = _Place(i, max(time for time in times if time < i))
         self.names = list(places)
         self.times = {name: clocks[place.time] for name, place in places.items() if place.field != place.time}
-        self.units = {
-            **{name: unit for name in self.times if (unit := self._unit(places[name].field))},
-            **dict.fromkeys(clocks.values(), "s"),
-        }
+        units = {name: self._cell(_UNIT, places[name].field).partition("(")[0].strip() for name in self.times}
+        stated = {name: unit for name, unit in units.items() if unit}  # of ``mm (Length)``; ``(None)`` states none
+        self.units = {**stated, **dict.fromkeys(clocks.values(), "s")}
         self._intervals = {
             name: 1e-3 * float(text)
             for name in self.times
@@ -115,10 +114,6 @@ class TwinCatSource(ArraysSource):
     def _cell(self, key: str, field: int) -> str:
         row = self._known.get(key, [])
         return row[field].strip() if field < len(row) else ""
-
-    def _unit(self, field: int) -> str:
-        """Return a channel's unit, of ``mm (Length)``; empty for ``(None)``."""
-        return self._cell(_UNIT, field).partition("(")[0].strip()
 
     def _scale_times(self, head: Sequence[tuple[int, list[str]]], first: Sequence[str]) -> None:
         """Find out what times are counted in, and from when."""

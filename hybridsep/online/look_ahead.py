@@ -340,7 +340,14 @@ class LookAhead:
         self.k += 1
         if self.k % self.Np == 0:
             self.planner.update(self._measured)
-            self._begin_window()
+            ahead, loads = (np.roll(one, -(self.k % self.delay)) for one in (self._ahead, self._loads))
+            try:
+                self.window = self.planner.plan(ahead, loads)
+            except SignalError as error:
+                self.diverged = str(error)
+                self.k -= 1  # the sample is refused, and outputs stay as they were
+                raise
+            self._compare()
 
     def check(self, x_d_ahead: float, x_meas: float, x_load: float = 0.0) -> None:
         """Raise SignalError if a window has diverged, or an input of the next sample is invalid."""
@@ -376,17 +383,6 @@ class LookAhead:
     def _first_compared(self) -> int:
         """First sample that is compared: with what was published behind the first fill, as it was measured."""
         return self.delay + self.predictor.settings.n_late
-
-    def _begin_window(self) -> None:
-        """Plan the next window; if it diverges, outputs keep the last one and later samples are refused."""
-        try:
-            ahead, loads = (np.roll(one, -(self.k % self.delay)) for one in (self._ahead, self._loads))
-            self.window = self.planner.plan(ahead, loads)
-            self._compare()
-        except SignalError as error:
-            self.diverged = str(error)
-            self.k -= 1  # the sample is refused, and outputs stay as they were
-            raise
 
     def _compare(self) -> None:
         """Append the window to what measurements are compared with."""

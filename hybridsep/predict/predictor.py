@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import ParameterError, SignalError, StateError
-from ..base.files import atomic_open
+from ..base.files import write_whole
 from ..base.settings import PredictorSettings, samples_before
 from ..base.signals import Array, as_measured, as_samples
 from ..base.state import arrays_of, pack, restored, restoring, unpack
@@ -383,9 +383,7 @@ class HybridPredictor:
 
     def save(self, path: str | Path) -> None:
         """Write :meth:`to_bytes` to a file."""
-        blob = self.to_bytes()
-        with atomic_open(path) as file:
-            file.write(blob)
+        write_whole(path, self.to_bytes())
 
     @classmethod
     def load(cls, path: str | Path, disturbances: Sequence[Disturbance] = ()) -> "HybridPredictor":

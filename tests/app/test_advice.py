@@ -15,6 +15,7 @@ from hybridsep.fitting.replay import Recording, Replay
 from hybridsep.logs.units import shown_in
 
 NP, N = 20, 1000
+MOVING = 1e-3 * np.sin(2 * np.pi * 3.3e-3 * np.arange(N))  # m: a command that moves all the time
 
 
 def judged(x_d: Array, hybrid: float, arx: float) -> Judged:
@@ -35,10 +36,8 @@ def judged(x_d: Array, hybrid: float, arx: float) -> Judged:
     ],
 )
 def test_more_motion_is_advised_where_there_is_little(hybrid: float, arx: float, own: str) -> None:
-    t = np.arange(N) * 1e-3
-    moving = 1e-3 * np.sin(2 * np.pi * 3.3 * t)
-    resting = moving[np.minimum(np.arange(N) % (N // 2), N // 20)]
-    advice = advice_on(judged(moving, hybrid, arx))
+    resting = MOVING[np.minimum(np.arange(N) % (N // 2), N // 20)]
+    advice = advice_on(judged(MOVING, hybrid, arx))
     assert advice.startswith(own)
     assert advice.endswith("judged by 25 windows.")
     advice = advice_on(judged(resting, hybrid, arx))
@@ -50,7 +49,7 @@ def test_more_motion_is_advised_where_there_is_little(hybrid: float, arx: float,
 @pytest.mark.parametrize("n", [N, N // 5])
 def test_a_hybrid_that_alone_began_trained_is_called_so(hybrid: float, n: int) -> None:
     """Beside rivals that learn from nothing, in the sentence that compares them, whatever it advises."""
-    found = judged(1e-3 * np.sin(2 * np.pi * 3.3e-3 * np.arange(N)), hybrid, 1e-6)
+    found = judged(MOVING, hybrid, 1e-6)
     cut = replace(found.replay, Np=NP * N // n)
     sentence = re.compile(r"the hybrid \(which alone began trained\)[^.]*\d\.\d\d ×", re.IGNORECASE)
     for warm in (False, True):
@@ -58,21 +57,18 @@ def test_a_hybrid_that_alone_began_trained_is_called_so(hybrid: float, n: int) -
 
 
 def test_a_difference_of_a_few_percent_is_none() -> None:
-    moving = 1e-3 * np.sin(2 * np.pi * 3.3e-3 * np.arange(N))
     for hybrid in (1.01e-6, 0.99e-6):
         words = f"neither better nor worse here: {hybrid / 1e-6:.2f} × the error of ARX20 (refitted), judged by 25"
-        assert words in advice_on(judged(moving, hybrid, 1e-6))
+        assert words in advice_on(judged(MOVING, hybrid, 1e-6))
     words = "Use the hybrid: its error is 0.50 × the error of ARX20 (refitted), the best of the others"
-    assert advice_on(judged(moving, 0.5e-6, 1e-6)).startswith(words)
+    assert advice_on(judged(MOVING, 0.5e-6, 1e-6)).startswith(words)
 
 
 def test_nothing_is_advised_where_the_axis_rests() -> None:
     """In the half that is tested, or in the one that physics model and others learn from."""
-    t = np.arange(N) * 1e-3
-    moving = 1e-3 * np.sin(2 * np.pi * 3.3 * t)
-    advice = advice_on(judged(np.where(t < 0.1, moving, moving[100]), 1e-6, 9e-6))
+    advice = advice_on(judged(np.where(np.arange(N) < 100, MOVING, MOVING[100]), 1e-6, 9e-6))
     assert advice == "Nothing was tested: the commanded position does not move in the half; record moves to its end."
-    advice = advice_on(replace(judged(moving, 1e-6, 9e-6), unidentified=True))
+    advice = advice_on(replace(judged(MOVING, 1e-6, 9e-6), unidentified=True))
     assert advice.startswith(
         "So far the hybrid is better than the physics model alone, 0.33 × its error, but the first"
     )
@@ -81,13 +77,12 @@ def test_nothing_is_advised_where_the_axis_rests() -> None:
 
 def judged_of_rounded(peer: float) -> Judged:
     """Return a judged log that is rounded to 1 µm, with the error of its peer, m."""
-    moving = 1e-3 * np.sin(2 * np.pi * 3.3e-3 * np.arange(N))
-    found = judged(moving, 2e-6, peer)
-    rounded = 1e-6 * np.round(moving / 1e-6)
+    found = judged(MOVING, 2e-6, peer)
+    rounded = 1e-6 * np.round(MOVING / 1e-6)
     result, [of_peer] = found.replay.backtest, found.replay.peers
     shifted = SimpleNamespace(**{name: getattr(result, name) + rounded for name in ("x_pb", "x_hold", "x_h")})
     peers = (replace(of_peer, predictions=(of_peer.predictions[0] + rounded,)),)
-    of_rounded = Recording(moving, rounded, N // 2)
+    of_rounded = Recording(MOVING, rounded, N // 2)
     return replace(
         found, replay=replace(found.replay, recordings=(of_rounded,), backtest=cast(Any, shifted), peers=peers)
     )
@@ -111,8 +106,7 @@ def test_an_axis_that_dwells_may_have_less_error_than_rounding_alone() -> None:
 
 def test_what_would_help_is_said() -> None:
     """A hybrid that is best at first in each window, and gets better over the log."""
-    t = np.arange(N) * 1e-3
-    one = judged(1e-3 * np.sin(2 * np.pi * 3.3 * t), 0.0, 9e-6)
+    one = judged(MOVING, 0.0, 9e-6)
     late = np.arange(N) % NP >= NP // 2
     error = np.where(late, np.where(np.arange(N) < 3 * N // 4, 9e-6, 5e-6), 1e-6)
     result = SimpleNamespace(x_pb=np.full(N, 3e-6), x_hold=np.full(N, -3e-6), x_h=error)

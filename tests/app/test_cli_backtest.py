@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,16 +15,11 @@ from hybridsep.evaluate.backtest import backtest
 MACHINE = ("-m", "spring_mass_damper")
 
 
-def rows_of(path: Path, keep: np.ndarray[Any, np.dtype[np.intp]], jitter: float = 0.0) -> Path:
-    t = np.arange(3000) * 1e-3 + np.random.default_rng(1).uniform(-jitter, jitter, 3000)
-    rows = np.column_stack((t, commanded()[:3000], measured(0)[:3000]))
-    np.savetxt(path, rows[keep], delimiter=",", header="t,x_d,x", comments="", fmt="%.17g")
-    return path
-
-
 def test_gaps_and_jitter_are_noted(hybridsep: Run, tmp_path: Path) -> None:
-    log = rows_of(tmp_path / "log.csv", np.r_[0:900, 960:3000], 2e-4)
-    page = tmp_path / "page.html"
+    log, page = tmp_path / "log.csv", tmp_path / "page.html"
+    t = np.arange(3000) * 1e-3 + np.random.default_rng(1).uniform(-2e-4, 2e-4, 3000)
+    rows = np.column_stack((t, commanded()[:3000], measured(0)[:3000]))[np.r_[0:900, 960:3000]]
+    np.savetxt(log, rows, delimiter=",", header="t,x_d,x", comments="", fmt="%.17g")
     status, out, err = hybridsep("backtest", log, *MACHINE, "--json", "--report", page)
     assert status == 0, err
     assert page.read_text(encoding="utf-8").partition("</table>")[2].count("As recorded.") == 1  # below the notes

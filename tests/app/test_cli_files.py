@@ -29,10 +29,6 @@ def own_machine(folder: Path) -> Path:
     return path
 
 
-def command_file(folder: Path) -> Path:
-    return write(folder / "command.csv", {"t": np.arange(200) * 1e-3, "x_d": np.zeros(200)})
-
-
 def refusal(run: Run, *arguments: object) -> str:
     """Run a command that must be refused with one line; return it without line breaks."""
     err = run.refused(*arguments)
@@ -48,17 +44,15 @@ def refusal(run: Run, *arguments: object) -> str:
 def test_what_is_read_is_not_overwritten(
     hybridsep: Run, tmp_path: Path, log: Path, link: Callable[[Path, Path], object] | None
 ) -> None:
-    machine, trajectory = own_machine(tmp_path), command_file(tmp_path)
-    for i, (file, what, suffix, command) in enumerate(
-        (
-            (log, "log", ".csv", ("backtest", log, "-m", machine, "--force")),
-            (trajectory, "trajectory", ".csv", ("cosim", "--trajectory", trajectory)),
-        )
+    machine = own_machine(tmp_path)
+    trajectory = write(tmp_path / "command.csv", {"t": np.arange(200) * 1e-3, "x_d": np.zeros(200)})
+    for file, what, option, command in (
+        (log, "log", "--save", ("backtest", log, "-m", machine, "--force")),
+        (trajectory, "trajectory", "--out", ("cosim", "--trajectory", trajectory)),
     ):
-        before, out = file.read_bytes(), file if link is None else tmp_path / f"other{i}{suffix}"
+        before, out = file.read_bytes(), file if link is None else tmp_path / f"other_{what}.csv"
         if link is not None:
             link(file, out)
-        option = "--save" if command[0] == "backtest" else "--out"
         said = refusal(hybridsep, *command, option, out)
         assert f"{option} {out} is the same file as the {what} {file}; choose another" in said
         assert file.read_bytes() == before

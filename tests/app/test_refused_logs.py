@@ -15,26 +15,21 @@ from hybridsep.logs.log import read_log
 MACHINE = ("--machine", "spring_mass_damper")
 
 
-@pytest.fixture
-def without_measurement(tmp_path: Path) -> Path:
-    return write_rows(tmp_path / "axis.csv", commanded()[:2000], np.full(2000, np.nan))
-
-
 @pytest.mark.parametrize(
     "command",
     [("fit", "--out", "deep/new"), ("backtest", *MACHINE, "--save", "new/run.csv", "--report", "new/page.html")],
     ids=lambda command: command[0],
 )
 def test_a_log_without_any_measurement(
-    hybridsep: Run, without_measurement: Path, command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+    hybridsep: Run, tmp_path: Path, command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """NaN in all samples: RuntimeWarnings, a state that had learned no sample, and three files."""
-    folder = without_measurement.parent
-    monkeypatch.chdir(folder)
+    write_rows(tmp_path / "axis.csv", commanded()[:2000], np.full(2000, np.nan))
+    monkeypatch.chdir(tmp_path)
     err = hybridsep.refused(command[0], "axis.csv", *command[1:])
     assert err.count("\n") == 1
     assert "the measured position is missing (NaN) in all 2000 samples; name its column (--x), or record it" in err
-    assert [path.name for path in folder.iterdir()] == ["axis.csv"]
+    assert [path.name for path in tmp_path.iterdir()] == ["axis.csv"]
 
 
 def test_a_refused_run_leaves_no_folder_and_takes_none_that_was_there(hybridsep: Run, tmp_path: Path) -> None:
@@ -92,9 +87,8 @@ def test_a_machine_file_that_fit_wrote_is_named(
 
 def test_the_same_log_twice_counts_once(tmp_path: Path, hybridsep: Run) -> None:
     logs = [write_rows(tmp_path / name, commanded()[:800], measured(0)[:800]) for name in ("a.csv", "b.csv")]
-    err = hybridsep.refused(
-        "fit", *logs, "--Np", 500, "--out", tmp_path / "fit"
-    )  # a refusal that comes behind, and soon
+    # A refusal that comes behind, and soon
+    err = hybridsep.refused("fit", *logs, "--Np", 500, "--out", tmp_path / "fit")
     assert f"note: {logs[1]} has the samples of {logs[0]}: it counts once" in err
 
 

@@ -42,14 +42,11 @@ class CGram:
     def _block(self) -> Any:
         return pointer(self.block)
 
-    def _put(self, row: Array) -> None:
-        place = self.library.hsep_gram_row(self._block)
-        for j, value in enumerate(row.tolist()):
-            place[j] = value
-
     def fold(self, rows: Array, target: Array) -> None:
         for row in np.column_stack((rows, target)):
-            self._put(row)
+            place = self.library.hsep_gram_row(self._block)
+            for j, value in enumerate(row.tolist()):
+                place[j] = value
             self.library.hsep_gram_fold(self._block)
 
     def fold_over(self, rows: Array, target: Array, repetitions: int) -> None:

@@ -132,20 +132,13 @@ def test_samples_behind_the_window_share_a_variance(monkeypatch: pytest.MonkeyPa
 def test_slopes_of_disturbances_of_the_user_are_followed() -> None:
     """Sines of the position given by the user act as the period's own: plans with them are the same."""
     turns = 2.0 * np.pi / 2e-3
-
-    def sine(x: Array, v: Array) -> Array:
-        return np.asarray(np.sin(turns * x))
-
-    def cosine(x: Array, v: Array) -> Array:
-        return np.asarray(np.cos(turns * x))
-
-    predictor = HybridPredictor(STAGE.model, AVERAGED, disturbances=(sine, cosine))
-    own = SepCompensator(predictor, SETTINGS)
+    sines = (lambda x, v: np.sin(turns * x), lambda x, v: np.cos(turns * x))
+    own = SepCompensator(HybridPredictor(STAGE.model, AVERAGED, disturbances=sines), SETTINGS)
     run(own)
     own.restart(0.0)
     known = SepCompensator.from_bytes(learned(2e-3))
     x_d = moves()[:200]
-    plans = [sep.plan(x_d) for sep in (SepCompensator.from_bytes(own.to_bytes(), (sine, cosine)), known)]
+    plans = [sep.plan(x_d) for sep in (SepCompensator.from_bytes(own.to_bytes(), sines), known)]
     assert np.abs(plans[1].x_dm - x_d[:50]).max() > 1e-6
     np.testing.assert_allclose(plans[0].x_dm, plans[1].x_dm, rtol=0.0, atol=1e-9)
     with pytest.raises(StateError, match="learned with 2 disturbances of the user's own, got 0"):
@@ -251,10 +244,8 @@ def test_a_plan_runs_away_at_its_bound(at_bound: int, of_physics: int, error: fl
 
 @pytest.mark.slow
 def test_an_outlier_of_a_millimetre_hardly_moves_the_command() -> None:
-    def wrong(k: int, x_meas: float) -> float:
-        return x_meas + (1e-3 if k == 430 else 0.0)
-
-    sound, other = cold()[0], run(compensator(), sensor=wrong)
+    sound = cold()[0]
+    other = run(compensator(), sensor=lambda k, x_meas: x_meas + (1e-3 if k == 430 else 0.0))
     assert np.max(np.abs(other.x_dm - sound.x_dm)) < 5e-6
 
 

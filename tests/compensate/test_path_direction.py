@@ -41,8 +41,8 @@ def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() ->
     basis, n, step = SplineBasis(80, 4, 80), 80, 1e-5
     steps = np.concatenate((np.full(30, step), np.zeros(30), np.full(20, -step)))  # it moves from the first sample on
     x_d, before, rest = 0.01 + np.cumsum(steps), np.full(3, 0.01), np.zeros(basis.values.shape[1])
-    of = {keep: DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, no_reversal=keep) for keep in (False, True)}
-    free, kept = (of[keep].bounds(x_d, before, np.zeros(3), rest) for keep in (False, True))
+    both = (DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, no_reversal=keep) for keep in (False, True))
+    free, kept = (one.bounds(x_d, before, np.zeros(3), rest) for one in both)
     forward, backward = np.zeros(4 * n, dtype=np.bool_), np.zeros(4 * n, dtype=np.bool_)
     forward[:30], backward[60:80] = True, True
     speed = step / (DRIVE_LIMITS.velocity * TS)  # share of the limit that the path takes
@@ -61,8 +61,7 @@ def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
     basis = SplineBasis(80, 4, 80)
     rest: Array = np.asarray(2e-4 * rng.normal(size=basis.values.shape[1]))
     bounds = DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, no_reversal=True)
-    found = bounds.bounds(move(80), np.zeros(3), np.zeros(3), rest)
-    assert found.allow(rest[N_DECIDED:])
+    assert bounds.bounds(move(80), np.zeros(3), np.zeros(3), rest).allow(rest[N_DECIDED:])
     assert np.min(np.diff(move(80) + basis.values @ rest)) < -1e-6  # it does turn
 
 

@@ -135,12 +135,12 @@ for instance in instances:
 # What is no FMU ----------------------------------------------------------------------------------------------------
 
 
-def of_binaries(change: Callable[[bytes], bytes]) -> Callable[[str, bytes], bytes]:
-    return lambda name, content: change(content) if name.startswith("binaries/") else content
+BINARIES, DESCRIPTION = "binaries/", "modelDescription.xml"
 
 
-def of_description(change: Callable[[bytes], bytes]) -> Callable[[str, bytes], bytes]:
-    return lambda name, content: change(content) if name == "modelDescription.xml" else content
+def below(prefix: str, change: Callable[[bytes], bytes | None]) -> Callable[[str, bytes], bytes | None]:
+    """Return a change of the files whose names begin so."""
+    return lambda name, content: change(content) if name.startswith(prefix) else content
 
 
 UNREADABLE = r"Odd\.fmu is not a readable FMU: "
@@ -149,32 +149,29 @@ UNREADABLE = r"Odd\.fmu is not a readable FMU: "
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (of_binaries(lambda content: b"none"), r"Odd\.fmu cannot be loaded: "),
+        (below(BINARIES, lambda content: b"none"), r"Odd\.fmu cannot be loaded: "),
         (
-            lambda name, content: None if name.startswith("binaries/") else content,
+            below(BINARIES, lambda content: None),
             r"Odd\.fmu cannot be loaded: binaries/.*FeedDrive\S* is missing, there are binaries for none",
         ),
         (
-            of_binaries(lambda content: content.replace(b"fmi2DoStep\0", b"fmi2DoStop\0")),
+            below(BINARIES, lambda content: content.replace(b"fmi2DoStep\0", b"fmi2DoStop\0")),
             r"Odd\.fmu cannot be loaded: .*undefined symbol: fmi2DoStep",
         ),
         (
-            of_description(lambda xml: re.sub(rb'guid="[^"]*"', b'guid="{0}"', xml)),
+            below(DESCRIPTION, lambda xml: re.sub(rb'guid="[^"]*"', b'guid="{0}"', xml)),
             r"Odd\.fmu cannot be instantiated: .*(?i:guid)",
         ),
-        (of_description(lambda xml: xml[:-40]), UNREADABLE),
+        (below(DESCRIPTION, lambda xml: xml[:-40]), UNREADABLE),
         (
-            of_description(lambda xml: xml.replace(b'causality="input"', b'causality="exput"')),
+            below(DESCRIPTION, lambda xml: xml.replace(b'causality="input"', b'causality="exput"')),
             f"{UNREADABLE}.*causality",
         ),
         (
-            of_description(lambda xml: xml.replace(b"CoSimulation", b"ModelExchange")),
+            below(DESCRIPTION, lambda xml: xml.replace(b"CoSimulation", b"ModelExchange")),
             r"is not a readable FMU|must be an FMI 2\.0 or 3\.0 co",
         ),
-        (
-            lambda name, content: None if name == "modelDescription.xml" else content,
-            rf"{UNREADABLE}.*modelDescription\.xml",
-        ),
+        (below(DESCRIPTION, lambda xml: None), rf"{UNREADABLE}.*modelDescription\.xml"),
     ],
 )
 def test_what_is_no_fmu_is_said_in_a_line_and_leaves_nothing_behind(
@@ -204,7 +201,7 @@ def test_archives_that_are_cut_or_damaged(native: Path, fmus: BuiltFmus, tmp_pat
     path.write_bytes(content)
     with pytest.raises(FmuError, match=r"Cut\.fmu cannot be loaded: "):
         FmuInstance(path)
-    changed(fmus("FeedDrivePy"), path, lambda name, data: None if name.endswith("machine.json") else data)
+    changed(fmus("FeedDrivePy"), path, below("resources/machine.json", lambda data: None))
     with pytest.raises(FmuError, match=r"Cut\.fmu cannot be instantiated: "):
         FmuInstance(path)
     assert not list(temporary.iterdir())
@@ -228,7 +225,7 @@ def test_threads_load_without_moving_the_process(
     """Relative paths, libraries that take a while to load, and some that cannot be loaded, in 8 threads at a time."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / native.name).write_bytes(native.read_bytes())
-    unloadable = changed(native, tmp_path / "Unloadable.fmu", of_binaries(lambda content: b"none"))
+    unloadable = changed(native, tmp_path / "Unloadable.fmu", below(BINARIES, lambda content: b"none"))
     load = fmpy.fmi1.cdll.LoadLibrary
 
     def load_slowly(path: str) -> Any:

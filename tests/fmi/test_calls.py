@@ -91,8 +91,7 @@ def test_what_fmi_2_has_besides_is_refused_by_name(fmu2: Library) -> None:
         ("GetDirectionalDerivative", (None, 0, None, 0, None, None), "providesDirectionalDerivative is false"),
         ("CancelStep", (), "fmi2CancelStep is not allowed"),
     ):
-        assert getattr(fmu2, name)(instance, *given) == ERROR
-        assert said in fmu2.messages[-1][2]
+        fmu2.refused(getattr(fmu2, name)(instance, *given), said)
     fmu2.FreeInstance(instance)
 
 
@@ -206,8 +205,7 @@ def test_values_are_read_and_written(fmu: Library) -> None:
             assert fmu.set(instance, name, value) == OK
             assert fmu.get(instance, name) == value
     assert fmu.set(instance, "input_hold", 2**30) == OK
-    assert fmu.ExitInitializationMode(instance) == ERROR
-    assert "input_hold must be" in fmu.messages[-1][2]
+    fmu.refused(fmu.ExitInitializationMode(instance), "input_hold must be")
     assert fmu.set(instance, "input_hold", 0) == OK
     assert fmu.ExitInitializationMode(instance) == OK  # what was wrong can be corrected
     steps(fmu, instance, 0, 330)
@@ -239,8 +237,7 @@ def test_derivatives_that_cannot_be_are_refused_and_none_is_taken(
     before = fmu2.save(instance)
     references = (c_uint * 2)(*(fmu2.references[name] for name in names))
     given = (c_int * 2)(*orders), (c_double * 2)(*values)
-    assert fmu2.SetRealInputDerivatives(instance, references, 2, *given) == ERROR
-    assert message.format(p=fmu2.references["p"]) in fmu2.messages[-1][2]
+    fmu2.refused(fmu2.SetRealInputDerivatives(instance, references, 2, *given), message.format(p=fmu2.references["p"]))
     assert fmu2.save(instance) == before
     assert fmu2.SetRealInputDerivatives(instance, references, 2, None, given[1]) == ERROR
     fmu2.FreeInstance(instance)
@@ -248,10 +245,8 @@ def test_derivatives_that_cannot_be_are_refused_and_none_is_taken(
 
 def test_bad_experiments_and_steps_are_refused(fmu: Library) -> None:
     instance = fmu.instance_in("instantiated")
-    assert fmu.begin(instance, math.nan) == ERROR
-    assert "startTime must be finite" in fmu.messages[-1][2]
-    assert fmu.begin(instance, 1.0, 0.5) == ERROR
-    assert "stopTime must be >= startTime = 1 s, got 0.5 s" in fmu.messages[-1][2]
+    fmu.refused(fmu.begin(instance, math.nan), "startTime must be finite")
+    fmu.refused(fmu.begin(instance, 1.0, 0.5), "stopTime must be >= startTime = 1 s, got 0.5 s")
     assert fmu.begin(instance, 1.0, 2.0) == fmu.ExitInitializationMode(instance) == OK
     assert fmu.time(instance) == 1.0
     if fmu.version == 3:
@@ -276,16 +271,12 @@ def test_status_functions(fmu2: Library) -> None:
     for name, value in (("", c_int()), ("Integer", c_int()), ("Real", c_double()), ("String", c_char_p())):
         assert getattr(fmu2, f"Get{name}Status")(instance, 1, byref(value)) == DISCARD
         assert f"fmi2Get{name}Status" in fmu2.messages[-1][2]
-        assert getattr(fmu2, f"Get{name}Status")(instance, 1, None) == ERROR
-        assert "value is NULL" in fmu2.messages[-1][2]
+        fmu2.refused(getattr(fmu2, f"Get{name}Status")(instance, 1, None), "value is NULL")
     fmu2.FreeInstance(instance)
 
 
 def test_log_categories_can_be_switched(fmu: Library) -> None:
     instance = fmu.instantiate(logging_on=True)
-
-    def switch(on: bool, *categories: bytes | None) -> None:
-        assert fmu.SetDebugLogging(instance, on, len(categories), (c_char_p * len(categories))(*categories)) == OK
 
     def heard() -> list[str]:
         fmu.messages.clear()
@@ -308,10 +299,9 @@ def test_log_categories_can_be_switched(fmu: Library) -> None:
         (False, (b"logAll",), []),
         (True, (), everything),
     ):
-        switch(on, *categories)
+        assert fmu.SetDebugLogging(instance, on, len(categories), (c_char_p * len(categories))(*categories)) == OK
         assert heard() == expected
-    assert fmu.SetDebugLogging(instance, True, 1, None) == ERROR
-    assert "categories is NULL" in fmu.messages[-1][2]
+    fmu.refused(fmu.SetDebugLogging(instance, True, 1, None), "categories is NULL")
     fmu.FreeInstance(instance)
 
 
@@ -387,8 +377,7 @@ def test_an_importer_that_runs_out_of_memory_keeps_what_it_has(fmu2: Library) ->
     )
     memory[0] = False
     for one in calls:
-        assert one() == ERROR
-        assert "no memory for" in fmu2.messages[-1][2]
+        fmu2.refused(one(), "no memory for")
         assert (place.value, fmu2.reals(poor)) == (None, before)
     memory[0] = True
     assert [one() for one in calls] == [OK] * 3

@@ -107,11 +107,6 @@ class Component:
         """The last one."""
         return str(self._loaded.stub_message().decode())
 
-    @property
-    def longest_name(self) -> int:
-        """Letters of the longest name of a pin, a parameter or a function."""
-        return int(self._loaded.stub_longest_name())
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -366,8 +361,10 @@ def test_nothing_but_numbers_is_written(folder: Path) -> None:
 
 
 def test_names_are_as_long_as_hal_allows(folder: Path) -> None:
+    """Those of pins, parameters and functions."""
     for model, letters in (("SepCompensator", 31), ("HybridPredictor", 21)):
-        assert Component(changed(folder, "n" * letters), folder, model).longest_name == 47
+        Component(changed(folder, "n" * letters), folder, model)
+        assert _library(model).stub_longest_name() == 47
 
 
 EVENTS = st.tuples(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from log_files import EVERY_FORMAT, FORMATS, columns, write, write_csv
+from log_files import EVERY_FORMAT, FORMATS, columns, refused, write, write_csv
 from places import EMPS
 from properties import examples
 
@@ -49,42 +49,32 @@ def test_every_format_gives_the_same_log_by_its_content(tmp_path: Path, suffix: 
 )
 def test_formats_without_a_reader(tmp_path: Path, content: bytes, message: str) -> None:
     (tmp_path / "file").write_bytes(content)
-    with pytest.raises(LogError, match=message):
-        read_log(tmp_path / "file")
+    refused(message, tmp_path / "file")
     (tmp_path / "log.mat").write_bytes(bytes(range(256)))
-    with pytest.raises(LogError, match=r"log\.mat: is truncated, damaged or not a MATLAB"):
-        read_log(tmp_path / "log.mat")
+    refused(r"log\.mat: is truncated, damaged or not a MATLAB", tmp_path / "log.mat")
     (tmp_path / "log.csv").write_bytes(bytes(range(256)) * 20)
-    with pytest.raises(LogError, match=r"log\.csv: is binary, though its name says text"):
-        read_log(tmp_path / "log.csv")
+    refused(r"log\.csv: is binary, though its name says text", tmp_path / "log.csv")
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"none\.csv: there is no such file"):
-        read_log(tmp_path / "none.csv")
+    refused(r"none\.csv: there is no such file", tmp_path / "none.csv")
     (tmp_path / "folder.csv").mkdir()
-    with pytest.raises(LogError, match=r"folder\.csv: is not a file"):
-        read_log(tmp_path / "folder.csv")
+    refused(r"folder\.csv: is not a file", tmp_path / "folder.csv")
     for suffix in (".csv", ".npz", ".mat"):
         path = tmp_path / f"empty{suffix}"
         path.touch()
-        with pytest.raises(LogError, match="the file is empty"):
-            read_log(path)
-    with pytest.raises(LogError, match=r"\.csv: (cannot be read: File name too long|there is no such file)"):
-        read_log(tmp_path / ("long" * 100 + ".csv"))
-    with pytest.raises(LogError, match="the file is empty, a line of column names was expected"):
-        read_log(write_csv(tmp_path / "blank.csv", "\n\n"))
+        refused("the file is empty", path)
+    refused(r"\.csv: (cannot be read: File name too long|there is no such file)", tmp_path / ("long" * 100 + ".csv"))
+    refused("the file is empty, a line of column names was expected", write_csv(tmp_path / "blank.csv", "\n\n"))
 
 
-@pytest.mark.parametrize(
-    ("suffix", "kept"), [(suffix, kept) for suffix in (".npz", ".mat", ".json") for kept in (0.01, 0.99)]
-)
+@pytest.mark.parametrize("suffix", [".npz", ".mat", ".json", ".csv.gz"])
+@pytest.mark.parametrize("kept", [0.01, 0.3, 0.99])
 def test_truncated_files(tmp_path: Path, suffix: str, kept: float) -> None:
-    path = write(tmp_path / f"log{suffix}", columns(500))
+    path = write(tmp_path / f"log{suffix}", columns(3000))
     data = path.read_bytes()
     path.write_bytes(data[: max(1, int(kept * len(data)))])
-    with pytest.raises(LogError, match=rf"log\{suffix}: is truncated, damaged or not"):
-        read_log(path)
+    refused(rf"log\{suffix}: is truncated(, damaged or not| or damaged( after line \d+)?: )", path)
 
 
 @FORMATS
@@ -94,9 +84,7 @@ def test_too_short(tmp_path: Path, suffix: str, n: int, came: str, T_s: float | 
     data = columns(n)
     if T_s is not None:
         del data["t"]
-    path = write(tmp_path / f"log{suffix}", data)
-    with pytest.raises(LogError, match=f"a log needs at least 2 samples, got {came}"):
-        read_log(path, T_s=T_s)
+    refused(f"a log needs at least 2 samples, got {came}", write(tmp_path / f"log{suffix}", data), T_s=T_s)
 
 
 # Times
@@ -124,16 +112,13 @@ def time_at(i: int, value: float) -> Array:
     ],
 )
 def test_bad_time(tmp_path: Path, t: Array, message: str) -> None:
-    path = write(tmp_path / "log.npz", {"t": t, "x_d": t * 0, "x": t * 0})
-    with pytest.raises(LogError, match=message):
-        read_log(path)
+    refused(message, write(tmp_path / "log.npz", {"t": t, "x_d": t * 0, "x": t * 0}))
 
 
 def test_given_ts_must_agree_with_the_time(tmp_path: Path) -> None:
     path = write(tmp_path / "log.csv", columns())
     assert read_log(path, T_s=1.005e-3).T_s == 1.005e-3
-    with pytest.raises(LogError, match=r"T_s = 0.002 s was given, but column 't' has an interval of 0.001 s"):
-        read_log(path, T_s=2e-3)
+    refused(r"T_s = 0.002 s was given, but column 't' has an interval of 0.001 s", path, T_s=2e-3)
     with pytest.raises(ParameterError, match="T_s must be 1e-05 … 1 s, got -1"):
         read_log(path, T_s=-1.0)
 
@@ -153,8 +138,7 @@ def test_the_interval_of_a_clock_that_jitters(
     t = np.arange(n) * 1e-3 + np.clip(numbers.normal(0.0, 1e-4, n), -4e-4, 4e-4)
     t = np.delete(t, numbers.integers(1, n - 1, rows_lost))
     t[n // 2 :] += 7.77  # recording stopped, and went on
-    path = write(tmp_path_factory.mktemp("jitter") / "log.npz", {"t": t, "x_d": t, "x": t})
-    T_s = read_log(path).T_s
+    T_s = read_log(write(tmp_path_factory.mktemp("jitter") / "log.npz", {"t": t, "x_d": t, "x": t})).T_s
     # Standard error of the mean: by two ends for each piece between gaps, √2 · 0.1 ms
     assert T_s == pytest.approx(1e-3, rel=5 * 0.1414 * np.sqrt(rows_lost + 2) / (n - rows_lost))
     if rows_lost == 0 and n > 15_000:
@@ -173,8 +157,7 @@ def test_an_interval_that_is_not_round_stays(tmp_path: Path) -> None:
 
 
 def test_a_median_between_two_intervals_that_differ_much(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "log.csv", "t,x_d,x\n0,0,0\n1,0,0\n11,0,0\n")
-    assert read_log(path).T_s == 5.5
+    assert read_log(write_csv(tmp_path / "log.csv", "t,x_d,x\n0,0,0\n1,0,0\n11,0,0\n")).T_s == 5.5
 
 
 def test_recorded_axis() -> None:
@@ -337,8 +320,7 @@ def test_how_many_rows_are_lost_must_be_told(tmp_path: Path) -> None:
     """By a clock that jitters as well; but half a row is none, and another segment begins."""
     keep = np.delete(np.arange(N), np.arange(50, 550, 20))
     jitter = np.random.default_rng(0).uniform(-2e-4, 2e-4, len(keep))
-    path = write(tmp_path / "log.npz", {"t": 1e-3 * keep + jitter, "x_d": X_D[keep], "x": X[keep]})
-    log = read_log(path)
+    log = read_log(write(tmp_path / "log.npz", {"t": 1e-3 * keep + jitter, "x_d": X_D[keep], "x": X[keep]}))
     assert (log.starts, len(log.t), np.isnan(log.x_meas).sum()) == ((0,), N, 25)
     t = 1e-3 * np.arange(N)
     t[300:] += 1.2e-3
@@ -349,8 +331,7 @@ def test_resampled_by_an_option(tmp_path: Path) -> None:
     t = 1e-3 * np.arange(N)
     keep = np.delete(np.arange(N), [100, 200, 201])
     uneven = t + 2e-4 * np.sin(np.arange(N))
-    path = write(tmp_path / "log.npz", {"t": uneven[keep], "x_d": X_D[keep], "x": X[keep]})
-    log = read_log(path, resample=True)
+    log = read_log(write(tmp_path / "log.npz", {"t": uneven[keep], "x_d": X_D[keep], "x": X[keep]}), resample=True)
     missing = np.flatnonzero(np.isnan(log.x_meas))
     assert (log.starts, missing.tolist()) == ((0,), [100, 200, 201])
     log = read(tmp_path, uneven, resample=True)

@@ -27,12 +27,11 @@ def solved(
     noise: float,
     correlation: float = 1.0,
     *,
-    scales: Array = SHARES,
     first: float = 1.0,
     least: float = 1e-9,
 ) -> SolvedExpert:
     variance = ExpertErrors(noise, correlation).variance(evidence.target_square, first, least)
-    return solve(evidence, variance, scales, p)
+    return solve(evidence, variance, SHARES, p)
 
 
 def written_out(
@@ -166,9 +165,7 @@ def test_the_minimum_meets_its_optimality_conditions(n: int, rank: int, ridge: f
 
 
 def test_a_singular_problem_has_a_minimum() -> None:
-    twice = np.full((2, 2), 2.0)
-    found = simplex_minimum(twice, np.array([1.0, 1.0]))
-    assert found.sum() == pytest.approx(0.5)
+    assert simplex_minimum(np.full((2, 2), 2.0), np.array([1.0, 1.0])).sum() == pytest.approx(0.5)
     np.testing.assert_array_equal(simplex_minimum(np.zeros((2, 2)), np.array([-1.0, -1.0])), 0.0)
 
 
@@ -228,8 +225,7 @@ def test_the_better_expert_is_preferred_and_evidence_fades() -> None:
 
 
 def test_without_evidence_the_weights_are_the_first_ones() -> None:
-    stack = Stack.init()
-    stack = stack.update(np.zeros((N_EXPERTS, NP)), np.zeros(NP), 0.0)
+    stack = Stack.init().update(np.zeros((N_EXPERTS, NP)), np.zeros(NP), 0.0)
     np.testing.assert_allclose(stack.weights, FIRST, atol=1e-12)
 
 
@@ -241,8 +237,7 @@ def test_physics_is_preferred_to_experts_that_know_nothing() -> None:
 
 
 def test_errors_below_the_least_mean_square_move_the_weights_little() -> None:
-    stack = Stack.init()
-    stack = stack.update(experts(np.full((3, NP), 1e-3)), np.full(NP, -1e-3), 1.0)
+    stack = Stack.init().update(experts(np.full((3, NP), 1e-3)), np.full(NP, -1e-3), 1.0)
     np.testing.assert_allclose(stack.weights, FIRST, atol=1e-4)
 
 
@@ -252,13 +247,10 @@ def test_first_weights_are_an_average() -> None:
 
 
 def test_an_expert_with_the_evidence_of_another_is_as_good() -> None:
-    stack = Stack.init()
-    stack = replayed(stack, (3.0, 0.1, 3.0), 30)
-    stack = stack.copy(EXPERTS[1], EXPERTS[0])
+    stack = replayed(Stack.init(), (3.0, 0.1, 3.0), 30).copy(EXPERTS[1], EXPERTS[0])
     np.testing.assert_allclose(stack.gram, stack.gram.T)
     assert stack.gram[0, 1] == stack.gram[0, 0] == stack.gram[1, 1]
     stack = stack.update(np.zeros((N_EXPERTS, NP)), np.zeros(NP), 0.0)
     assert stack.weights[1] - stack.weights[0] == pytest.approx(FIRST[1] - FIRST[0])  # what alone tells them apart
-    stack = stack.forget(EXPERTS[0])
-    stack = stack.update(np.zeros((N_EXPERTS, NP)), np.zeros(NP), 0.0)
+    stack = stack.forget(EXPERTS[0]).update(np.zeros((N_EXPERTS, NP)), np.zeros(NP), 0.0)
     assert stack.weights[0] < 1e-9

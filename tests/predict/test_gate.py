@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from predictor_cases import averaged_model
+from predictor_cases import MODEL, averaged_model
 
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.model.physics import ModalModel
 from hybridsep.plants.trajectory import staircase
 from hybridsep.predict.averaging.experts import COMMAND_RESIDUAL, MODEL_RESIDUAL
 from hybridsep.predict.averaging.gate import InnovationGate, gated
@@ -116,9 +115,8 @@ def test_an_axis_that_stands_is_believed() -> None:
 
 
 def test_missing_samples_are_counted_and_bridged() -> None:
-    model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
     x_d = staircase()[:2000]
-    predictor = HybridPredictor(model, PredictorSettings(averaging=True))
+    predictor = HybridPredictor(MODEL, PredictorSettings(averaging=True))
     x_pb, _ = predictor.discrete.forced_response(predictor.discrete.rest(), x_d)
     e_pb = 0.5 * np.diff(x_pb, prepend=0.0)  # a residual that a feature describes exactly
     gaps = np.random.default_rng(3).random(2000) < 0.01
@@ -132,8 +130,7 @@ def test_missing_samples_are_counted_and_bridged() -> None:
 
 
 def test_each_measured_sample_is_learned_whatever_is_missing_before_it() -> None:
-    model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
-    predictor = HybridPredictor(model, PredictorSettings(averaging=True, p=10))
+    predictor = HybridPredictor(MODEL, PredictorSettings(averaging=True, p=10))
     x = staircase()[: 2 * NP]
     for i in range(0, 2 * NP, NP):
         predictor.predict(x[i : i + NP])
@@ -143,8 +140,7 @@ def test_each_measured_sample_is_learned_whatever_is_missing_before_it() -> None
 
 
 def test_what_is_missing_is_predicted_and_shifted_as_its_neighbours_are_off() -> None:
-    model = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
-    predictor = HybridPredictor(model, PredictorSettings(averaging=True, Np=10, p=10))
+    predictor = HybridPredictor(MODEL, PredictorSettings(averaging=True, Np=10, p=10))
     x_d = staircase()[:20]
     measured = x_d + 1e-6
     predictor.predict(x_d[:10])

@@ -96,11 +96,8 @@ def test_what_is_no_disturbance_is_refused_and_nothing_is_learned(returned: Arra
 
 def test_a_function_that_fails_where_the_drive_was_measured_changes_nothing() -> None:
     x_d, x = into_the_buffer()
-
-    def fails_beyond(x: Array, v: Array) -> Array:
-        return np.where(x > START + 0.006, np.nan, spring(x, v))
-
-    one, twin = predictor(fails_beyond), predictor(spring)
+    one = predictor(lambda x, v: np.where(x > START + 0.006, np.nan, spring(x, v)))
+    twin = predictor(spring)
     one.predict(x_d[:100])
     twin.predict(x_d[:100])
     before = one.to_bytes()

@@ -99,11 +99,8 @@ def test_another_run_recalls_what_was_measured_after_the_same_commands() -> None
     """Commands that were known ahead at the end of a run are not part of the next one."""
     rng = np.random.default_rng(5)
     path, residuals = np.cumsum(rng.normal(size=140)), rng.normal(size=100)
-    memory = Memory.init(SIZE, 20)
-    for k in range(0, 100, 20):
-        memory = memory.append_commands(path[k : k + 60], 20).remember(residuals[k : k + 20])
+    memory = heard(path, residuals, 20, ahead=40).restart()
     path -= path[0]
-    memory = memory.restart()
     for k in range(0, 60, 20):
         memory = memory.append_commands(path[k : k + 20], 20).remember(residuals[k : k + 20])
     recalled, before, _ = memory.append_commands(path[60:80], 20).recalled(20)

@@ -134,18 +134,13 @@ def test_a_diverging_prediction_has_a_finite_deviation() -> None:
     assert window(uncertainty, variance=PREDICTION_MAX).std.max() <= PREDICTION_MAX
 
 
-def covered(predictor: HybridPredictor, x_d: Array, x: Array) -> list[float]:
-    """Return the share of measurements within the intervals of :data:`LEVELS`."""
-    result = backtest(predictor, x_d, x)
-    return [coverage(x - result.x_h, result.x_h_std, level) for level in LEVELS]
-
-
 @pytest.mark.parametrize(("averaging", "atol"), [(True, 0.04), (False, 0.07)])
 def test_intervals_cover_friction_and_noise(averaging: bool, atol: float) -> None:
     x_d = cycles(8000)
     x = physics(x_d) + friction(x_d, FRICTION) + np.random.default_rng(6).normal(0.0, 2e-6, len(x_d))
     predictor = averaged() if averaging else HybridPredictor(averaged().model, PredictorSettings(averaging=False))
-    shares = covered(predictor, x_d, x)
+    result = backtest(predictor, x_d, x)
+    shares = [coverage(x - result.x_h, result.x_h_std, level) for level in LEVELS]
     np.testing.assert_allclose(shares[1:], LEVELS[1:], atol=atol)
     assert shares[0] == pytest.approx(0.5, abs=0.1)
 

@@ -23,9 +23,9 @@ LOADS: dict[str, dict[str, Value]] = {
 }
 
 
-def load(n: int = N) -> Array:
+def load() -> Array:
     """Return a load that the command says nothing of, m."""
-    t = T_S * np.arange(n)
+    t = T_S * np.arange(N)
     return np.asarray(2e-4 * np.sin(21.0 * t) * (t > 0.1) + 1e-4 * (1.0 - np.cos(47.0 * t)))
 
 

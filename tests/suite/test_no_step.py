@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from driving import T_S, initialise
+from driving import T_S
 from properties import share
 from scipy.ndimage import maximum_filter1d
 from stream import COMPENSATOR, OUTPUTS, Array, Stream
@@ -59,8 +59,7 @@ def random_run(stream: Stream, seed: int) -> Array:
 @pytest.mark.parametrize("seed", range(3, 3 + share(30)))
 @pytest.mark.parametrize("horizon", [0, HORIZON])
 def test_whatever_comes_in(new_stream: StreamMaker, seed: int, horizon: int) -> None:
-    stream = new_stream()
-    initialise(stream, measurement_timeout=0.05, horizon=horizon, **LIMITS)
+    stream = new_stream.begun(measurement_timeout=0.05, horizon=horizon, **LIMITS)
     outputs = random_run(stream, seed)
     x_dm, x_d = (outputs[:, OUTPUTS[COMPENSATOR].index(name)] for name in ("x_dm", "x_d"))
     assert np.max(np.abs(x_dm - x_d)) > 0.0

@@ -115,8 +115,7 @@ def assert_refused(stream: Stream, t: float, h: float, message: str) -> None:
 @on_adapters((*LOOK_AHEADS, TRAJECTORY, *PLANTS))
 @pytest.mark.parametrize("h", [0.0, -T_S, math.nan, math.inf, 100.5])
 def test_a_step_size_that_cannot_be_changes_nothing(new_stream: StreamMaker, h: float) -> None:
-    stream = new_stream()
-    initialise(stream)
+    stream = new_stream.begun()
     steps(stream, 0, 50)
     assert_refused(stream, 0.05, h, f"the communication step size must be > 0 and ≤ 100 s, got {h}")
     stream.step(0.05, T_S)
@@ -128,8 +127,7 @@ OTHER_TIMES = pytest.mark.parametrize("t", [0.0, 0.0506, 0.0494, math.nan, math.
 @on_adapters((*LOOK_AHEADS, TRAJECTORY))
 @OTHER_TIMES
 def test_a_step_from_another_time_changes_nothing(new_stream: StreamMaker, t: float) -> None:
-    stream = new_stream()
-    initialise(stream)
+    stream = new_stream.begun()
     steps(stream, 0, 50)
     assert_refused(stream, t, T_S, f"the communication point must be 0.05 s, where the last step ended, got {t} s")
     stream.step(0.0496 if t < 0.05 else 0.0504, T_S)  # rounding, of an importer that means it badly
@@ -196,9 +194,8 @@ def test_a_load_that_is_no_position_changes_nothing(new_stream: StreamMaker, val
 def test_a_plants_command_that_is_no_position_changes_nothing(
     new_stream: StreamMaker, value: float, expected: str
 ) -> None:
-    stream, untroubled = new_stream(), new_stream()
+    stream, untroubled = new_stream.begun(), new_stream.begun()
     for each in (stream, untroubled):
-        initialise(each)
         steps(each, 0, 3)
     stream.set("x_d", value)
     timeless = (new_stream.implementation, "a plant's time") in CANNOT

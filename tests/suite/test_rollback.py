@@ -155,8 +155,7 @@ def test_states_go_on_in_another_process(fmus: BuiltFmus, tmp_path: Path) -> Non
 
 @on_adapters(ALL, needs="bad states")
 def test_damaged_and_truncated_states_are_refused(new_stream: StreamMaker) -> None:
-    stream = new_stream()
-    initialise(stream)
+    stream = new_stream.begun()
     steps(stream, 0, 130)
     blob = stream.save()
     damaged = [bytes((*blob[:i], blob[i] ^ 0x10, *blob[i + 1 :])) for i in range(0, len(blob), 1 + len(blob) // 60)]
@@ -168,8 +167,7 @@ def test_damaged_and_truncated_states_are_refused(new_stream: StreamMaker) -> No
 
 @on_adapters(LOOK_AHEADS, needs="bad states")
 def test_states_of_other_models_are_refused(new_stream: StreamMaker) -> None:
-    stream = new_stream()
-    initialise(stream)
+    stream = new_stream.begun()
     before = stream.save()
     other = new_stream(next(model for model in LOOK_AHEADS if model != new_stream.model))
     other.initialise({})

@@ -6,13 +6,12 @@ run in steps of ``T_s`` that gets the inputs so latched must show the same outpu
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
 from fractions import Fraction
 from itertools import accumulate, pairwise
 
 import numpy as np
 import pytest
-from driving import T_S, initialise, position, set_inputs, steps
+from driving import T_S, position, set_inputs, steps
 from stream import CANNOT, COMPENSATOR, LOOK_AHEADS, PLANTS, PREDICTOR, TRAJECTORY, Array, RefusedStreamError
 from streams import StreamMaker, on_adapters, on_all
 
@@ -39,8 +38,7 @@ def steps_of(pattern: str) -> list[Fraction]:
 
 def in_steps(new_stream: StreamMaker, sizes: list[Fraction], start: float) -> tuple[Clock, list[list[float]]]:
     """Return the communication points, in samples, and the outputs at each; inputs are read at the step's start."""
-    stream = new_stream()
-    initialise(stream, start)
+    stream = new_stream.begun(start)
     points, outputs = [Fraction(0)], [stream.outputs()]
     for size in sizes:
         # The importer's time: an exact sum, rounded once.
@@ -65,8 +63,7 @@ def instants_of(points: Clock) -> Clock:
 
 def in_samples(new_stream: StreamMaker, points: Clock, start: float) -> list[list[float]]:
     """Return the outputs at the points in steps of ``T_s``, with the inputs that the other run's instants latch."""
-    stream = new_stream()
-    initialise(stream, start)
+    stream = new_stream.begun(start)
     instants = instants_of(points)
     outputs = [stream.outputs()]
     for k, instant in enumerate(instants[:-1]):
@@ -89,36 +86,30 @@ def test_outputs_are_those_of_the_last_instant(new_stream: StreamMaker, pattern:
         assert shown == truth, f"{float(point)} samples"
 
 
-def _whole_nanoseconds(n: int, T_s: float) -> Array:
-    return np.arange(n, dtype=np.float64) * (round(T_s * 1e9) * 1e-9)
-
-
-def _single_precision(n: int, T_s: float) -> Array:
-    return (99.0 + np.arange(n) * T_s).astype(np.float32).astype(np.float64)
-
-
-def _sum_of_steps(n: int, T_s: float) -> Array:
-    return np.cumsum(np.full(n, T_s))
+THIRD = 1 / 3000  # s
 
 
 @pytest.mark.parametrize(
-    ("times_of", "T_s", "warned"),
-    [(_whole_nanoseconds, 1 / 3000, 0), (_single_precision, 1 / 3000, 1), (_sum_of_steps, 1 / 3000, 0)],
+    ("times", "warned"),
+    [
+        (np.arange(301) * (round(THIRD * 1e9) * 1e-9), 0),
+        ((99.0 + np.arange(301) * THIRD).astype(np.float32).astype(np.float64), 1),
+        (np.cumsum(np.full(301, THIRD)), 0),
+    ],
+    ids=["whole nanoseconds", "single precision", "sum of steps"],
 )
 @on_adapters((PREDICTOR, COMPENSATOR))
 def test_figures_with_an_importers_times_are_those_of_exact_steps(
-    new_stream: StreamMaker, times_of: Callable[[int, float], Array], T_s: float, warned: int
+    new_stream: StreamMaker, times: Array, warned: int
 ) -> None:
     """Every sample arrives once: the same outputs to the last bit; rounding of single precision is said once."""
-    times = times_of(301, T_s)
     runs = []
     for exact in (True, False):
-        stream = new_stream()
-        initialise(stream, times[0], T_s=T_s)
+        stream = new_stream.begun(times[0], T_s=THIRD)
         outputs = []
         for k, (t, h) in enumerate(zip(times[:-1], np.diff(times), strict=True)):
             set_inputs(stream, k * T_S)
-            stream.step(*((times[0] + k * T_s, T_s) if exact else (float(t), float(h))))
+            stream.step(*((times[0] + k * THIRD, THIRD) if exact else (float(t), float(h))))
             outputs.append(stream.outputs())
         runs.append(outputs)
     assert runs[0] == runs[1]
@@ -131,8 +122,7 @@ def test_figures_with_an_importers_times_are_those_of_exact_steps(
 
 @on_all(LOOK_AHEADS, needs="warnings")
 def test_each_kind_of_warning_is_given_once(new_stream: StreamMaker) -> None:
-    stream = new_stream()
-    initialise(stream)
+    stream = new_stream.begun()
     now = 0.0
     for h in (1.03e-3, 0.98e-3, 1.02e-3, 8e-3, 8e-3, 1.02e-3):
         stream.step(now, h)
@@ -162,8 +152,7 @@ def test_a_measurement_that_is_to_come_early_is_said_once(new_stream: StreamMake
 
 @on_all((*LOOK_AHEADS, TRAJECTORY))
 def test_a_restored_state_has_the_grid_that_it_was_saved_with(new_stream: StreamMaker) -> None:
-    stream = new_stream()
-    initialise(stream)
+    stream = new_stream.begun()
     steps(stream, 0, 3)
     t, tails = 3 * T_S, []
     for _ in range(60):  # the grid moves by 2.4 samples
@@ -189,9 +178,7 @@ def test_a_restored_state_has_the_grid_that_it_was_saved_with(new_stream: Stream
 @on_adapters((PREDICTOR, TRAJECTORY))
 def test_a_time_that_accumulates_rounding_is_no_error(new_stream: StreamMaker) -> None:
     # At 1e10 s the sum of t += T_s drifts by half a sample in a thousand steps.
-    stream, exact = new_stream(), new_stream()
-    for each in (stream, exact):
-        initialise(each, 1e10)
+    stream, exact = new_stream.begun(1e10), new_stream.begun(1e10)
     t = 1e10
     for k in range(1200):
         for each, now in ((stream, t), (exact, 1e10 + k * T_S)):
@@ -205,9 +192,7 @@ def test_a_time_that_accumulates_rounding_is_no_error(new_stream: StreamMaker) -
 
 @on_all(LOOK_AHEADS)
 def test_inputs_are_read_at_instants_only(new_stream: StreamMaker) -> None:
-    stream, whole = new_stream(), new_stream()
-    for each in (stream, whole):
-        initialise(each, 2.5)
+    stream, whole = new_stream.begun(2.5), new_stream.begun(2.5)
     for k in range(130):
         for part in range(4):
             if part == 0:
@@ -232,9 +217,7 @@ def test_a_ramp_with_derivatives_is_that_of_single_samples(new_stream: StreamMak
             new_stream().set_slope("x_d_ahead", 1.0)
         return
     ramp, slope = (0.002, 0.05), (0.04, 0.035)  # m, m/s of x_d_ahead and x_meas
-    long, single = new_stream(), new_stream()
-    for each in (long, single):
-        initialise(each)
+    long, single = new_stream.begun(), new_stream.begun()
     for k in range(400):
         # Summed as in a long step, because a plan passes on the rounding of its inputs enlarged.
         inputs = [a + b * ((k - k % 8) * T_S) + b * (k % 8 * T_S) for a, b in zip(ramp, slope, strict=True)]
@@ -280,9 +263,6 @@ def test_plants_move_the_same_in_any_steps(new_stream: StreamMaker, step: str) -
     n = min(map(len, runs))
     np.testing.assert_allclose(runs[0][:n], runs[1][:n], rtol=0, atol=1e-9)
     assert np.ptp(runs[0]) > 1e-3
-
-
-THIRD = 1 / 3000  # s
 
 
 @pytest.mark.parametrize("step", [333_333e-9, float(np.float32(THIRD)), 0.1 + THIRD - 0.1])

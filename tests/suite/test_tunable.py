@@ -63,8 +63,7 @@ def assert_limits(x_dm: Array) -> None:
 @averages
 @compensators
 def test_changes_act_from_the_next_window_on_and_fade(new_stream: StreamMaker, averaging: bool) -> None:
-    stream = new_stream()
-    initialise(stream, averaging=averaging, **LIMITS)
+    stream = new_stream.begun(averaging=averaging, **LIMITS)
     outputs, expected = changed_run(stream), of_the_library(averaging)
     x_dm, x_d, state = (column(outputs, name) for name in ("x_dm", "x_d", "sep_state"))
     np.testing.assert_allclose(x_dm, column(expected, "x_dm"), rtol=0, atol=TOLERANCE)
@@ -86,15 +85,13 @@ def test_changes_act_from_the_next_window_on_and_fade(new_stream: StreamMaker, a
 
 @compensators
 def test_a_saved_state_carries_what_was_changed(new_stream: StreamMaker) -> None:
-    stream = new_stream()
-    initialise(stream, **TIGHT)
+    stream = new_stream.begun(**TIGHT)
     changed_run(stream, 0, 135)  # off from 140 on
     blob = stream.save()
     expected = steps(stream, 135, 200)
     stream.restore(blob)
     assert steps(stream, 135, 200) == expected
-    other = new_stream()
-    initialise(other, **TIGHT)
+    other = new_stream.begun(**TIGHT)
     other.restore(blob)
     assert steps(other, 135, 200) == expected
     blob = stream.save()  # while it is off
@@ -118,9 +115,8 @@ def test_a_saved_state_carries_what_was_changed(new_stream: StreamMaker) -> None
 def test_a_value_out_of_range_is_refused_when_it_is_set(
     new_stream: StreamMaker, name: str, value: float, message: str
 ) -> None:
-    stream, untroubled = new_stream(), new_stream()
+    stream, untroubled = new_stream.begun(), new_stream.begun()
     for each in (stream, untroubled):
-        initialise(each)
         steps(each, 0, 50)
     with pytest.raises(RefusedStreamError, match=re.escape(message)):
         stream.set(name, value)
@@ -185,8 +181,7 @@ def tripping_library() -> Array:
 
 @compensators
 def test_a_trip_fades_and_ends_with_a_rising_reset(new_stream: StreamMaker) -> None:
-    stream = new_stream()
-    initialise(stream, following_error_max=ALLOWED, **LIMITS)
+    stream = new_stream.begun(following_error_max=ALLOWED, **LIMITS)
     outputs, expected = tripping_run(stream), tripping_library()
     x_dm, x_d, state, alarm = (column(outputs, name) for name in ("x_dm", "x_d", "sep_state", "alarm"))
     np.testing.assert_allclose(x_dm, column(expected, "x_dm"), rtol=0, atol=1e-9)
@@ -208,8 +203,7 @@ def test_a_trip_fades_and_ends_with_a_rising_reset(new_stream: StreamMaker) -> N
 def test_what_is_measured_above_the_limit_and_until_the_reset_is_not_learned(new_stream: StreamMaker) -> None:
     seen = []
     for beside in (BEYOND, -10 * BEYOND):
-        stream = new_stream()
-        initialise(stream, following_error_max=ALLOWED, **LIMITS)
+        stream = new_stream.begun(following_error_max=ALLOWED, **LIMITS)
         outputs = []
         for k in range(N_RUN):
             set_inputs(stream, k * T_S)
@@ -228,8 +222,7 @@ def test_what_is_measured_above_the_limit_and_until_the_reset_is_not_learned(new
 
 @on_all((COMPENSATOR,))
 def test_the_papers_model_trips_alike(new_stream: StreamMaker) -> None:
-    stream = new_stream()
-    initialise(stream, averaging=False, following_error_max=ALLOWED, **LIMITS)
+    stream = new_stream.begun(averaging=False, following_error_max=ALLOWED, **LIMITS)
     outputs = tripping_run(stream, 0, 279, averaging=False)
     assert np.flatnonzero(column(outputs, "alarm")).tolist() == []  # 172 is measured
     stream.reset()
@@ -244,8 +237,7 @@ def test_the_papers_model_trips_alike(new_stream: StreamMaker) -> None:
 def test_a_measurement_is_compared_with_the_command_of_its_time(new_stream: StreamMaker, delay: int) -> None:
     preview = int(SHORT[COMPENSATOR]["preview"])
     for beside, tripped in ((0, False), (1, True)):
-        stream = new_stream()
-        initialise(stream, measurement_delay=delay, following_error_max=1e-9)
+        stream = new_stream.begun(measurement_delay=delay, following_error_max=1e-9)
         for k in range(170):
             stream.set("x_d_ahead", position(k * T_S))
             stream.set("x_meas", position(max(0, k - preview - delay + beside) * T_S))
@@ -256,9 +248,7 @@ def test_a_measurement_is_compared_with_the_command_of_its_time(new_stream: Stre
 
 @compensators
 def test_a_saved_state_carries_a_trip_and_the_level_of_the_reset(new_stream: StreamMaker) -> None:
-    stream, other = new_stream(), new_stream()
-    for each in (stream, other):
-        initialise(each, following_error_max=ALLOWED, **LIMITS)
+    stream, other = (new_stream.begun(following_error_max=ALLOWED, **LIMITS) for _ in range(2))
     for first, last in ((0, 173), (173, 250), (250, 320)):
         tripping_run(stream, first, last)
         blob = stream.save()
@@ -270,8 +260,7 @@ def test_a_saved_state_carries_a_trip_and_the_level_of_the_reset(new_stream: Str
 
 @compensators
 def test_the_limit_may_change_in_a_run(new_stream: StreamMaker) -> None:
-    stream = new_stream()
-    initialise(stream)
+    stream = new_stream.begun()
     tripping_run(stream, 0, 170)
     stream.set("following_error_max", 1e-6)
     tripping_run(stream, 170, 171)

@@ -1,13 +1,12 @@
 """What every implementation shows, against windows that are computed one by one from the whole log."""
 
 import math
-from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
-from driving import SHORT, closed_loop, initialise, replay, run
+from driving import SHORT, closed_loop, replay, run
 from library_stream import library_compensator, start_values
 from numpy.typing import NDArray
 from oracle import held
@@ -19,29 +18,6 @@ from hybridsep import backtest
 from hybridsep.plants.plant import Encoder, simulate
 
 
-def predictions(x_d: Array, x: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return ``x_pb``, ``x_h`` and whether ``x_h`` is the hybrid one, of a log, by the default machine's predictor."""
-    result = backtest(machine_of("HybridPredictor").new_predictor(), x_d, x)
-    return result.x_pb, result.x_h, result.active
-
-
-def plans(values: Mapping[str, Value], r: Array, x: Array) -> dict[str, Array]:
-    """Return what plans made window by window of the commands ``r`` and the measured positions ``x`` come to."""
-    given: dict[str, Any] = {**start_values(COMPENSATOR), **values}
-    compensator, preview, Np = library_compensator(given), given["preview"], given["Np"]
-    compensator.restart(float(r[0]), t_init=given["t_init"], lead_in=preview)
-    x_d = np.concatenate((np.full(preview, r[0]), r))
-    columns: dict[str, list[Array]] = {name: [] for name in ("x_dm", "x_d", "x_pb", "x_h", "sep_state")}
-    for k in range(0, len(r), Np):
-        plan = compensator.plan(x_d[k : k + preview])
-        state = np.where(np.arange(Np) < plan.n_followed, plan.state_before, plan.state).astype(np.float64)
-        window = (plan.x_dm, x_d[k : k + Np], plan.x_pb, plan.x_h, state)
-        for column, samples in zip(columns.values(), window, strict=True):
-            column.append(samples)
-        compensator.update(x[k : k + Np])
-    return {name: np.concatenate(column) for name, column in columns.items()}
-
-
 def shown_by(new_stream: StreamMaker, n: int, values: dict[str, Value], start: float = 0.0) -> dict[str, np.ndarray]:
     """Return the inputs of a closed loop of the library and what a stream shows of it."""
     loop, stream = closed_loop(new_stream.model, n, values, start=start), new_stream()
@@ -49,22 +25,31 @@ def shown_by(new_stream: StreamMaker, n: int, values: dict[str, Value], start: f
     return dict(zip(OUTPUTS[new_stream.model], replay(stream, loop).T, strict=True)) | {"r": loop.r, "x_meas": loop.x}
 
 
-PLANS: dict[str, Value] = {"Np": 50, "p": 20, "q": 3, "t_init": 0.1}
+PLANS: dict[str, Value] = {"Np": 50, "p": 20, "q": 3, "t_init": 0.1, "preview": 170}
 
 
 @cache
-def predicted(start: float) -> tuple[Array, Array, Any]:
-    """Return what the library predicts of the closed loop's log, window by window."""
-    loop = closed_loop(PREDICTOR, 1700, {}, start=start)
-    return predictions(loop.r[:-100], loop.x[100:])
+def predicted() -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return ``x_pb``, ``x_h`` and whether that is the hybrid one, of the closed loop's log, window by window."""
+    loop = closed_loop(PREDICTOR, 1700, {}, start=0.1)
+    result = backtest(machine_of("HybridPredictor").new_predictor(), loop.r[:-100], loop.x[100:])
+    return result.x_pb, result.x_h, result.active
 
 
 @cache
-def planned(preview: int, start: float) -> dict[str, Array]:
+def planned() -> dict[str, Array]:
     """Return what the library plans of the closed loop's log, window by window."""
-    values = PLANS | {"preview": preview}
-    loop = closed_loop(COMPENSATOR, 900, values, start=start)
-    return plans(values, loop.r, loop.x)
+    loop = closed_loop(COMPENSATOR, 900, PLANS, start=0.1)
+    given: dict[str, Any] = {**start_values(COMPENSATOR), **PLANS}
+    compensator, preview, Np = library_compensator(given), given["preview"], given["Np"]
+    compensator.restart(float(loop.r[0]), t_init=given["t_init"], lead_in=preview)
+    x_d, windows = np.concatenate((np.full(preview, loop.r[0]), loop.r)), []
+    for k in range(0, len(loop.r), Np):
+        plan = compensator.plan(x_d[k : k + preview])
+        state = np.where(np.arange(Np) < plan.n_followed, plan.state_before, plan.state)
+        windows.append((plan.x_dm, x_d[k : k + Np], plan.x_pb, plan.x_h, state))
+        compensator.update(loop.x[k : k + Np])
+    return dict(zip(("x_dm", "x_d", "x_pb", "x_h", "sep_state"), np.hstack(windows), strict=True))
 
 
 def tolerance_of(new_stream: StreamMaker) -> float:
@@ -74,7 +59,7 @@ def tolerance_of(new_stream: StreamMaker) -> float:
 @on_all((PREDICTOR,))
 def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker) -> None:
     shown = shown_by(new_stream, 1700, {}, 0.1)
-    x_pb, x_h, active = predicted(0.1)
+    x_pb, x_h, active = predicted()
     n, tolerance = len(x_pb), tolerance_of(new_stream)
     np.testing.assert_array_equal(shown["x_d"][100 : 100 + n], shown["r"][:n])
     np.testing.assert_allclose(shown["x_pb"][100 : 100 + n], x_pb, rtol=0, atol=tolerance)
@@ -85,8 +70,8 @@ def test_predictions_are_those_of_the_delayed_log(new_stream: StreamMaker) -> No
 @pytest.mark.slow
 @on_all((COMPENSATOR,))
 def test_commands_are_those_of_plans_made_window_by_window(new_stream: StreamMaker) -> None:
-    shown = shown_by(new_stream, 900, PLANS | {"preview": 170}, 0.1)
-    expected = planned(170, 0.1)
+    shown = shown_by(new_stream, 900, PLANS, 0.1)
+    expected = planned()
     exact = new_stream.implementation == LIBRARY
     for name in ("x_dm", "x_d", "x_pb", "x_h", "sep_state"):
         np.testing.assert_allclose(shown[name][:900], expected[name], rtol=0, atol=0 if exact else 1e-9, err_msg=name)
@@ -95,9 +80,8 @@ def test_commands_are_those_of_plans_made_window_by_window(new_stream: StreamMak
 
 @on_all((PREDICTOR,))
 def test_the_first_fill_keeps_the_drive_at_its_start_and_is_not_learned(new_stream: StreamMaker) -> None:
-    streams = [new_stream(), new_stream()]
+    streams = [new_stream.begun(x_d_ahead=0.25) for _ in range(2)]
     for stream, x_meas in zip(streams, (17.0, 0.25), strict=True):
-        initialise(stream, x_d_ahead=0.25)
         for k in range(20):
             stream.set("x_d_ahead", 0.3)
             stream.set("x_meas", x_meas)

@@ -136,13 +136,8 @@ class Library:
     def begin(self, start: float, weights: bytes | None = None) -> int:
         """Begin; return hsep_began."""
         self.block = (ctypes.c_double * (self.size() // 8))()
-        arguments = (
-            ctypes.byref(self.parameters),
-            ctypes.c_double(start),
-            weights,
-            ctypes.c_size_t(len(weights or b"")),
-        )
-        return int(self._call("init", self.block, *arguments))
+        size = ctypes.c_size_t(len(weights or b""))
+        return int(self._call("init", self.block, ctypes.byref(self.parameters), ctypes.c_double(start), weights, size))
 
     def weights(self, room: int = sys.maxsize) -> bytes:
         """Return what was learned so far, as a weights file; empty if there is less room for it, bytes."""

@@ -98,6 +98,11 @@ class Library:
     def blocks(self) -> dict[int, int]:
         return self.allocated
 
+    def refused(self, status: int, said: str) -> None:
+        """Check that a call was refused, with a text in the last message."""
+        assert status == ERROR
+        assert said in self.messages[-1][2]
+
     def instantiate(
         self,
         name: bytes | None = b"one",

@@ -15,7 +15,9 @@ import pyarrow.parquet as pq
 import pytest
 from scipy import io
 
+from hybridsep.base.errors import LogError
 from hybridsep.base.signals import Array
+from hybridsep.logs.log import read_log
 
 Columns = dict[str, Any]
 
@@ -153,6 +155,12 @@ def write(path: Path, data: Columns) -> Path:
     return path
 
 
+def refused(message: str, recording: Any, **how: Any) -> None:
+    """Check that a log is refused with a message."""
+    with pytest.raises(LogError, match=message):
+        read_log(recording, **how)
+
+
 def _rated(data: Columns) -> dict[str, tuple[float, Any]]:
     return {name: (float(data["t"][1] - data["t"][0]), values) for name, values in data.items() if name != "t"}
 
@@ -161,15 +169,11 @@ def _traced(data: Columns) -> dict[str, tuple[float, float, Any]]:
     return {name: (float(data["t"][0]), *rated) for name, rated in _rated(data).items()}
 
 
-def _positions(data: Columns) -> Columns:
-    return {name: values for name, values in data.items() if name != "t"}
-
-
 _RECORDERS: dict[str, Callable[[Path, Columns], object]] = {
     ".parquet": write_parquet,
     ".xml": lambda path, data: path.write_text(trace_xml(_traced(data), kind="none")),
     ".scope": lambda path, data: path.write_text(twincat_csv(_rated(data))),
-    ".hal": lambda path, data: path.write_text(halscope_csv(_positions(data))),
+    ".hal": lambda path, data: path.write_text(halscope_csv({name: data[name] for name in data if name != "t"})),
 }
 """Writers of recorders' formats."""
 

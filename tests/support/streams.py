@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from built_once import BuiltFmus
 from c_core import CModel, RefusedError, write_trajectory
+from driving import initialise
 from library_stream import LookAheadStream, PlantStream, learned_file
 from stream import (
     CANNOT,
@@ -185,6 +186,12 @@ class StreamMaker:
         """Return a new stream, of another model if one is given, that starts warm with a saved predictor."""
         self._made.append(self._new(model or self.model, weights))
         return self._made[-1]
+
+    def begun(self, start: float = 0.0, **values: Value) -> Stream:
+        """Return a new stream that is initialised, a look-ahead with short windows."""
+        stream = self()
+        initialise(stream, start, **values)
+        return stream
 
     def planted(self, learned: bytes) -> Stream:
         """Return a new stream whose resources have this ``weights.bin``, which no build would have let in."""
