@@ -89,7 +89,8 @@ def backtest(
         replayed = replayed.with_peers(lambda done: advance("ARX models", 0.8 + 0.2 * done))
     known = weights is not None and knew(HybridPredictor.load(weights), predictor)
     warm, controller = weights is not None, controller_of([read])
-    scores, words = replayed.backtest, whole_log_words(warm=warm, known=known) + settling_words(replayed)
+    scores, words = replayed.backtest, whole_log_words(warm=warm, known=known)
+    words += "" if known else settling_words(replayed)
     judged = Judged(replayed, read.T_s, shown, "the whole log", known=known, warm=warm, controller=controller)
     settings = predictor.settings
     run = replayed_run(*(scores, read.x_d, read.x_meas, read.T_s, settings.Np), measurement_delay=settings.n_late)

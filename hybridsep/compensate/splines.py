@@ -37,7 +37,8 @@ def solved_splines(n: int, window: int) -> Array:
     twice, and behind four windows four times as far apart. What is planned there is planned again, with closer knots,
     before it acts, and goes on as it is until then: a plan changes the last one by these splines.
 
-    ``n``: splines that a plan may change; ``window``: splines that begin in a window.
+    ``n``: splines that a plan may change, from the first one that is not pinned on; ``window``: splines that begin in a
+    window, which count as 4 at least.
     """
     two_scale = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 8.0  # a cubic spline by those with half its knot interval
     columns, begin, sums, window = [], 0, np.ones(1), max(window, 4)

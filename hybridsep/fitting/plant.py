@@ -134,7 +134,8 @@ def commands_to_try(recordings: Sequence[Recording]) -> Array:
     """Return commands of a log to try with, m: its first 20 000 from where it moves, to rest where it rests.
 
     They begin where the log began, as stiffness and what is learned of the position count from there; where that is in
-    motion, with a lead-in from rest to its velocity, by half the largest acceleration of the commands.
+    motion, with a lead-in from rest to its velocity, by half the largest acceleration of the commands: what counts from
+    the start is off by it then.
     """
     distances = [float(np.abs(np.diff(one.x_d)).sum()) for one in recordings]
     found = recordings[distances.index(max(distances))].x_d
@@ -146,8 +147,10 @@ def commands_to_try(recordings: Sequence[Recording]) -> Array:
     found = found[:last] if last > len(found) // 2 else found
     if not starts_in_motion(found):
         return found
-    first = found[1] - found[0]
-    n = math.ceil(3.0 * abs(first) / max(float(np.abs(np.diff(found, 2)).max(initial=0.0)), 1e-3 * abs(first)))
+    over = min(10, len(found) - 1)  # samples: a command may be held
+    first = (found[over] - found[0]) / over
+    acceleration = float(np.abs(np.diff(found[::over], 2)).max(initial=0.0)) / over**2
+    n = math.ceil(3.0 * abs(first) / max(acceleration, 1e-3 * abs(first)))
     share = np.arange(n, 0, -1) / n  # of the way to the first sample, backwards
     steps = first * share**2 * (3.0 - 2.0 * share)
     return np.concatenate((found[0] - np.cumsum(steps)[::-1], found))

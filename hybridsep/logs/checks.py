@@ -352,8 +352,13 @@ def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterato
         options = (("--delay N", "where the recorder is known to be N samples late"),)
         yield Finding("late", words, {"lag": found.lag * log.T_s}, options=options)
     error = x - x_d[np.maximum(np.arange(len(x_d)) - found.lag_of_one, 0)]
-    offset = float(np.nanmedian(error))
-    spread = float(np.nanquantile(np.abs(error - offset), _USUAL))
+    way = np.sign(np.diff(x_d, prepend=x_d[0]))  # in one direction alone a lag looks like an offset
+    parts = [part for part in (error[way == one] for one in (-1.0, 0.0, 1.0)) if np.isfinite(part).sum() > _SAMPLES_MIN]
+    medians = [float(np.nanmedian(part)) for part in parts]
+    if len(medians) < 2 or min(medians) * max(medians) <= 0.0:
+        return
+    offset = min(medians, key=abs)
+    spread = float(np.nanquantile(np.abs(error - np.nanmedian(error)), _USUAL))
     if abs(offset) > max(spread, resolution(x)):
         words = (
             f"the measured position is {log.shown.words(offset, '+.4g')} away from its command, while the error varies "

@@ -88,7 +88,7 @@ def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated
         )
     gaps, lost = _gaps(t, interval)
     starts = gaps[lost[gaps] == 0]
-    words = (*_words(t, np.flatnonzero(lost), T_s, _PUT_BACK), *_words(t, starts, T_s))
+    words = (*_words(t, np.flatnonzero(lost), T_s, _PUT_BACK, lost[lost > 0]), *_words(t, starts, T_s))
     return Times(t, T_s, (0, *starts.tolist()), (*remarks, *words), lost if lost.any() else None)
 
 
@@ -164,12 +164,14 @@ def _is_one_of(ratio: float, *known: float) -> bool:
 _PUT_BACK = "the command is the cubic through its neighbours there, the measurement missing"
 
 
-def _words(t: Array, at: Indices, T_s: float, what: str = "another segment begins after each") -> list[str]:
-    """Return what is missing before samples, and what is done there."""
+def _words(
+    t: Array, at: Indices, T_s: float, what: str = "another segment begins after each", rows: Indices | None = None
+) -> list[str]:
+    """Return what is missing before samples, as many ``rows`` as are put back or as times tell, and what is done."""
     steps = np.diff(t)[at - 1]
     gaps, back, said = at[steps > 0.0], at[steps <= 0.0], []
     if len(gaps):
-        lost = np.round(steps[steps > 0.0] / T_s) - 1.0
+        lost = np.round(steps[steps > 0.0] / T_s) - 1.0 if rows is None else rows
         longest = float(steps[steps > 0.0].max())
         said.append(
             f"{lost.sum():.6g} sample{'s are' if lost.sum() > 1 else ' is'} missing in {len(gaps)} "

@@ -346,6 +346,13 @@ def test_an_offset_is_noted_where_the_error_varies_by_less(rest: float, offset: 
         assert "where only the zeros differ, take the offset away" in found["offset"].words
 
 
+def test_a_lag_in_one_direction_is_no_offset() -> None:
+    x_d = 5e-5 * np.maximum(np.arange(4000.0) - 500.0, 0.0)
+    x = lfilter([1.0 / 24.4], [1.0, -23.4 / 24.4], x_d)
+    assert "offset" not in {one.name for one in check(log_of(x_d, x))}
+    assert "offset" not in {one.name for one in check(log_of(x_d[500:] + 1e-3, x[500:] + 1e-3))}
+
+
 def test_a_coarse_encoder_does_not_stand_behind_a_lag() -> None:
     """Moves of a few steps of the encoder after rests: a step comes late, and nothing sticks."""
     moves_of = np.repeat(np.random.default_rng(3).uniform(0.0, 20e-6, 30), 200)

@@ -322,9 +322,18 @@ def test_how_many_rows_are_lost_must_be_told(tmp_path: Path) -> None:
     jitter = np.random.default_rng(0).uniform(-2e-4, 2e-4, len(keep))
     log = read_log(write(tmp_path / "log.npz", {"t": 1e-3 * keep + jitter, "x_d": X_D[keep], "x": X[keep]}))
     assert (log.starts, len(log.t), np.isnan(log.x_meas).sum()) == ((0,), N, 25)
+    assert log.remarks[0].startswith("25 samples are missing in 25 gaps")
     t = 1e-3 * np.arange(N)
     t[300:] += 1.2e-3
     assert read(tmp_path, t).starts == (0, 300)
+
+
+def test_commands_alone_may_be_held(tmp_path: Path) -> None:
+    """As a trajectory is read; a measured position that is held is a slow sensor's, whose samples are kept."""
+    held = X_D[np.arange(N) // 2 * 2]
+    path = write(tmp_path / "log.npz", {"t": 1e-3 * np.arange(N), "x_d": held})
+    log = read_log(path, columns={"x_d": "x_d", "x": "x_d"})
+    np.testing.assert_array_equal(log.x_d, held)
 
 
 def test_resampled_by_an_option(tmp_path: Path) -> None:

@@ -444,7 +444,7 @@ static hsep_real averaged_planner_predict(
     return (hsep_real)count * work->sample + rows * work->row + (first == 0 ? work->commands : 0.0);
 }
 
-/* Bound on the work that is left of a plan where it begins, or behind the Newton step. */
+/* The work that is left of a plan, nearly always at most, where it begins, or behind the Newton steps. */
 static hsep_real averaged_planner_left(
     hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work)
 {

@@ -50,7 +50,7 @@ typedef struct {
     hsep_real cost_of_rest; /* and of the remainder of the last plan */
     hsep_real bound;        /* share of change_max that bounds the averaged model's plan */
     hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
-    hsep_real left;         /* and that this part and all after it take at most */
+    hsep_real left;         /* and that this part and all after it nearly always take */
     /* Offsets in words from the beginning of the struct */
     hsep_int rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_int best;       /* (3 + n,) m, coefficients of the best plan so far */
@@ -98,14 +98,15 @@ HSEP_API void hsep_averaged_planner_init(
  * measurement adds late^2 / 2 multiply-adds for each expert, here and in the last part, for variances. */
 HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best);
 
-/* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that may be left,
+/* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that is left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
  * Cost: of a plan at most, with n splines that are solved for and all = preview + late samples, f^2 / 2 multiply-adds
  * for each expert with f features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 3 steps
  * of the physics model's programme, and 3 Newton steps of n preview p / 3 for each expert, n^2 preview / 4, 2
  * predictions, and 5 steps of their programmes; or 5 steps of the first, and of the programme of a plan that ends
- * compensation. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all (f + 60) for each expert, and
- * 700 all. */
+ * compensation, which has all splines that are not pinned; a second length of a Newton step, rarely tried, adds
+ * a prediction to the last sample. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all (f + 60)
+ * for each expert, and 700 all. */
 HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples);
 
 #endif

@@ -262,7 +262,7 @@ HSEP_API void hsep_interior_begin(
     self->cost = cost / (hsep_real)a.slacks.n;
     self->beyond = tolerance->margin;
     /* The proximal term bounds A' W A by P / HSEP_QP_REGULARISATION: where active bounds hardly differ, rounding in it
-     * would outgrow P. */
+     * would outgrow P. That of a uniform spline: wide ones have up to four times as much. */
     hsep_real largest = 0.0;
     for (hsep_int i = 0; i < a.n; i++) {
         largest = hsep_fmax(largest, P[0]);
