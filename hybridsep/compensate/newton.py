@@ -305,6 +305,7 @@ class AveragedPlanner:
     ) -> None:
         self._basis, self._splines, self._jerk_weight, self._model = basis, splines, jerk_weight, model
         self._x_d, self._unchanged = x_d, np.zeros(splines.shape[1])
+        self._values, self._third = (one[:, N_DECIDED:] @ splines for one in (basis.values, basis.third))
         self._third_before = np.diff(np.concatenate((delta_before, np.zeros(basis.preview))), 3)
 
     def point(self, coefficients: Array, change: Array | None = None) -> PlannedPoint:
@@ -321,10 +322,11 @@ class AveragedPlanner:
     ) -> PlannedPoint:
         """Return the plan behind Newton steps, as long as they lower the cost.
 
-        ``n_followed``: leading samples that the plan leaves as they are; other parameters as of :meth:`step`.
+        ``bounds``: on its coefficients; ``n_followed``: leading samples that it leaves as they are; ``passed``:
+        (preview, n_free): free splines filtered by ``G_pb``; other parameters as of :meth:`step`.
         """
         n = max(1, n_followed // _STEP)
-        bounds = bounds.of_change(previous_plan[N_DECIDED:], self._splines)
+        bounds, passed = bounds.of_change(previous_plan[N_DECIDED:], self._splines), passed @ self._splines
         for i, reach in enumerate(_REACHES[1:2] if n == 1 else _REACHES[:n]):
             tolerance = TOLERANCE._replace(steps=_FIRST_STEPS) if i == 0 and n > 1 else TOLERANCE
             before, start = start, self.step(start, previous_plan, bounds, passed, reach, tolerance)
@@ -344,14 +346,12 @@ class AveragedPlanner:
         """Return the plan behind a Newton step; the start itself, if none is better.
 
         ``start``: where the model is linearised; ``previous_plan``: (3 + n_free,), m: coefficients of the remainder
-        of the last plan, the decided ones first; ``bounds``: on its change; ``passed``: (preview, n_free): free splines
-        filtered by ``G_pb``; ``reach``: of friction's slope, as of :meth:`PlanModel.slope`; ``tolerance``: of the
-        solver.
+        of the last plan, the decided ones first; ``bounds``: on its change; ``passed``: (preview, m): the splines that
+        are solved for, filtered by ``G_pb``; ``reach``: of friction's slope, as of :meth:`PlanModel.slope`;
+        ``tolerance``: of the solver.
         """
-        splines = self._basis.values[:, N_DECIDED:] @ self._splines
-        third = self._basis.third[:, N_DECIDED:] @ self._splines
-        slope = self._model.slope(start.prediction, splines, passed @ self._splines, reach)
-        W, at = self._basis.weight[:, None] * slope, start.change
+        slope = self._model.slope(start.prediction, self._values, passed, reach)
+        W, at, third = self._basis.weight[:, None] * slope, start.change, self._third
         P = W.T @ W + self._jerk_weight * (third.T @ third)
         target = self._basis.weight * (self._x_d - start.x_h) + W @ at
         v = W.T @ target - self._jerk_weight * (third.T @ (start.third - third @ at))

@@ -78,7 +78,7 @@ class PublishedPosition(NamedTuple):
 class Planning(ABC):
     """Plans with a residual model."""
 
-    PINNED: ClassVar[int]  # leading samples of a window in which a plan follows the last one, if limits bound it
+    PINNED: ClassVar[int]  # leading samples of a window in which a bounded plan, or any change of the last, follows it
     SOLVED: ClassVar[Tolerance]  # to which programmes are solved
     paused: int  # windows that the residual model does not plan now
     pause: int  # and after its next plan that runs away

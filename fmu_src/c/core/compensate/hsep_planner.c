@@ -15,11 +15,10 @@
  * otherwise the last stop goes on. */
 typedef struct {
     hsep_int preview; /* samples of the command that are known */
-    hsep_int
-        shared; /* splines that a stop has from its plan: those of a window, and what the next plan leaves as it is, */
-    hsep_int n; /* and those before all coefficients are alike */
-    hsep_int count; /* coefficients: the decided ones and those of all splines that begin in the preview */
-    hsep_real pole; /* of a change that fades, from spline to spline */
+    hsep_int shared;  /* splines that a stop has from its plan, those of a window and the next plan's pinned ones, */
+    hsep_int n;       /* and those before all coefficients are alike */
+    hsep_int count;   /* coefficients: the decided ones and those of all splines that begin in the preview */
+    hsep_real pole;   /* of a change that fades, from spline to spline */
     /* Offsets in words from the beginning of the struct */
     hsep_int last;  /* (count,) m, the last stop, */
     hsep_int own;   /* (count,) m, by which it differs from one that stops as these do, */

@@ -95,7 +95,7 @@ HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[],
 HSEP_API void hsep_splines_gram(
     const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real products[], hsep_real work[]);
 
-/* The sum of squares of a spline's rows: the largest entry on the diagonal of A' A. */
+/* The sum of squares of a uniform spline's rows: the largest entry on the diagonal of A' A. */
 HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self);
 
 /* The triangle of n rows := W' W of the splines behind a filter, W's columns being the filtered spline, (preview,),
