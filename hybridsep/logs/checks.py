@@ -45,7 +45,7 @@ _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 _START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
 _LATE = 0.1  # lag, s, from which it is noted: the look-ahead of a controller of which nothing is known
 
-_ALONE, _SIZE = 10.0, 0.02  # size of an outlier in the usual steps, and in the travel, from which it is noted
+_ALONE, _SIZE = 10.0, 0.02  # size of an outlier in the usual steps, and relative to the travel, to be noted
 
 _USUAL = 0.98  # quantile of what is usual, beyond which are the samples that are looked for
 
