@@ -226,19 +226,17 @@ static void averaged_planner_shape_all(hsep_averaged_planner *self, hsep_planner
         const hsep_knot knot = hsep_knots_at(&plans->knots, i);
         const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
         const hsep_linearised_change change = averaged_planner_shape(self, plans, knot.level);
-        hsep_real *commands = hsep_at(self, (hsep_int)(change.commands - hsep_at(self, 0)));
-        hsep_real *passed = hsep_at(self, (hsep_int)(change.passed - hsep_at(self, 0)));
         averaged_planner_begins(self)[i] = begin;
-        memset(commands, 0, (size_t)change.n * sizeof(hsep_real));
-        memset(passed, 0, (size_t)preview * sizeof(hsep_real));
+        memset(change.commands, 0, (size_t)change.n * sizeof(hsep_real));
+        memset(change.passed, 0, (size_t)preview * sizeof(hsep_real));
         for (hsep_int j = 0; j < knot.length; j++) {
-            hsep_axpy(commands + j * spacing, knot.share[j], b, 4 * spacing);
+            hsep_axpy(change.commands + j * spacing, knot.share[j], b, 4 * spacing);
             if (j * spacing < preview) {
-                hsep_axpy(passed + j * spacing, knot.share[j], spline, preview - j * spacing);
+                hsep_axpy(change.passed + j * spacing, knot.share[j], spline, preview - j * spacing);
             }
         }
         for (hsep_int k = begin; k < preview; k++) {
-            hsep_at(self, self->W)[i * preview + k] = weight[k] * passed[k - begin];
+            hsep_at(self, self->W)[i * preview + k] = weight[k] * change.passed[k - begin];
         }
     }
     while (self->spline < self->m) {

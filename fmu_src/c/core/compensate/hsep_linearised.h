@@ -50,9 +50,9 @@ HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_pa
 
 /* A change of the commands that begins at sample 0 of the preview. */
 typedef struct {
-    const hsep_real *commands; /* (n,) m, oldest first, and nothing behind them */
+    hsep_real *commands; /* (n,) m, oldest first, and nothing behind them */
     hsep_int n;
-    const hsep_real *passed; /* (preview,) m, the same behind G_pb */
+    hsep_real *passed; /* (preview,) m, the same behind G_pb */
 } hsep_linearised_change;
 
 /* Begin to linearise a model that has learned, for a change that may begin at any sample of the preview: what does not

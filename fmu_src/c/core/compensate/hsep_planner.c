@@ -127,7 +127,6 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
 
 /* The drive's limits are linear constraints on the rows of a plan (hsep_splines.h), in shares of a limit. */
 
-/* Rows of x_dm, of delta in order 0, under the remainder of the last plan, in shares; and the direction of x_d. */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
@@ -475,7 +474,10 @@ static void stop_rows(const hsep_stop *self, const hsep_splines *splines, const 
 {
     hsep_real now[HSEP_ORDERS] = {0.0};
     for (hsep_int k = 0; k < self->preview; k++) {
-        hsep_splines_row(splines, now, hsep_splines_sum(splines, c, self->count, k), rows, self->preview, k);
+        hsep_differ(now, hsep_splines_sum(splines, c, self->count, k));
+        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+            rows[order * self->preview + k] = now[order] * splines->share[order];
+        }
     }
 }
 

@@ -48,17 +48,6 @@ static inline void hsep_differ_from(hsep_real differences[HSEP_ORDERS], const hs
     }
 }
 
-/* Rows of a change at sample k of count, from those at the sample before. */
-static inline void hsep_splines_row(
-    const hsep_splines *self, hsep_real differences[HSEP_ORDERS], hsep_real value, hsep_real rows[], hsep_int count,
-    hsep_int k)
-{
-    hsep_differ(differences, value);
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        rows[order * count + k] = differences[order] * self->share[order];
-    }
-}
-
 /* Splines that begin in a plan and end four samples before it does, or earlier. preview >= 4 spacing + 3. */
 static inline hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing)
 {
