@@ -153,10 +153,7 @@ class Fit:
 
         With a window ``in_position``, m or rad, it says how long moves take to settle within it, and which are worst.
 
-        Raises
-        ------
-        OSError
-            If it cannot be written, or ``path`` is a folder.
+        OSError if it cannot be written, or ``path`` is a folder.
         """
         if Path(path).is_dir():
             raise IsADirectoryError(errno.EISDIR, "the report's path must be a file", str(path))
@@ -192,14 +189,13 @@ class Fit:
         fmus: bool = True,
         report: bool = True,
         in_position: float | None = None,
-        progress: Progress | None = None,
+        progress: Progress = lambda _message, _done: None,
     ) -> dict[str, Path]:
         """Write the files of :func:`~hybridsep.fitting.build.fit_files` to a folder; return them, by what they are.
 
         ``fmus`` and ``report`` say whether they are among them; ``in_position`` is the report's; ``progress`` is
         told a message and the fraction done.
         """
-        progress = progress or (lambda _message, _done: None)
         if Path(out).exists() and not Path(out).is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "out must be a folder", str(out))
         files = fit_files(Path(out), self.machine.name, compensator=self.tracking is not None)
@@ -257,7 +253,7 @@ def fit(
     look_ahead: float | None = None,
     cascade: Mapping[str, float] | None = None,
     name: str = "axis",
-    progress: Progress | None = None,
+    progress: Progress = lambda _message, _done: None,
     **known: float,
 ) -> Fit:
     """Identify an axis from what was recorded of it, choose settings, and judge them on samples that were held out.
@@ -308,7 +304,6 @@ def fit(
     if unknown := set(cascade or ()) - Cascade.parameters().keys():
         raise ParameterError(f"cascade has {', '.join(Cascade.parameters())}, got {listed(sorted(unknown))}")
     gains = None if cascade is None else Cascade(**cascade)
-    progress = progress or (lambda _message, _done: None)
     given_limits = drive_limits(known)
     names = [*PredictorSettings.KNOWN, *(one.name for one in DRIVE_LIMIT_ENTRIES.values())]
     entries: dict[str, Any] = {name: known[name] for name in PredictorSettings.KNOWN if name in known}

@@ -116,11 +116,6 @@ class TableSource(_GivenSource):
         if index is not None and not callable(index) and not known_names("t", self.names):
             self._add_time(index)
 
-    @staticmethod
-    def recognises(head: bytes) -> bool:
-        """Return False: it is no file."""
-        return False
-
     def _add_time(self, index: Any) -> None:
         """Take an index for the time: of times or fractions, called so, or numbers some of which are left out."""
         name, labels = str(getattr(index, "name", None) or "index"), index_values(index)

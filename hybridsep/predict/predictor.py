@@ -114,14 +114,9 @@ class HybridPredictor:
         return f"HybridPredictor({', '.join(f'{name} = {value!r}' for name, value in shown.items())})"
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0) -> None:
-        """Begin another run, at rest at ``start``; what was learned is kept (warm start).
+        """Begin another run, at rest at ``start``, m, or the first command; what was learned is kept (warm start).
 
-        Parameters
-        ----------
-        start : float, optional
-            Initial position, m; the first command if left out.
-        t_init : float
-            Warm-up of the new run, s; none by default. −1: automatic.
+        ``t_init``, s, is its warm-up, none by default; −1: automatic.
         """
         rest = None if start is None else float(as_samples([start], "start")[0])
         n_init = samples_before(replace(self.settings, t_init=t_init).warm_up, self.T_s)
@@ -140,14 +135,7 @@ class HybridPredictor:
         self.state = replace(self.state, start=start)
 
     def take_over(self, learned: Any, uncertainty: Uncertainty, regressions: tuple[RidgeRegression, ...]) -> None:
-        """Take over what another predictor with the same settings has learned; :meth:`restart` then begins a run.
-
-        Parameters
-        ----------
-        learned, regressions : Learned and tuple of RidgeRegression
-            Of its residual model.
-        uncertainty : Uncertainty
-        """
+        """Take over what another predictor with the same settings has learned; :meth:`restart` then begins a run."""
         residual = self.residual.take_over(learned, regressions)
         self.state = replace(self.state, residual=residual, uncertainty=uncertainty)
 
@@ -165,10 +153,6 @@ class HybridPredictor:
             In a compensator, commands of its preview before they are modified; ``x_d`` if left out.
         scales : FeatureScales, optional
             With averaging: scales of the features, in a compensator; from ``x_d`` if left out.
-
-        Returns
-        -------
-        Prediction
 
         Raises
         ------
@@ -202,17 +186,11 @@ class HybridPredictor:
     def update(self, x: ArrayLike, *, learn: bool = True) -> None:
         """Learn from the measurement of the predicted window, or of its first samples; eq. (6).
 
-        Parameters
-        ----------
-        x : (m,) array_like, m
-            Measured positions that arrived, ``1 ≤ m ≤ n`` of the last :meth:`predict`.
-        learn : bool
-            Whether the samples enter the regression; the next window starts from their residuals in any case.
+        ``x``, (m,), m: measured positions that arrived, ``1 ≤ m ≤ n`` of the last :meth:`predict`; ``learn``: whether
+        they enter the regression; the next window starts from their residuals in any case.
 
-        Raises
-        ------
-        SignalError
-            If nothing was predicted, ``x`` is longer than the window, or a value is not finite. Nothing is changed.
+        SignalError if nothing was predicted, ``x`` is longer than the window, or a value is not finite; nothing is
+        changed then.
         """
         if self.pending is None:
             raise SignalError("update must follow predict: there is no predicted window to measure")
@@ -245,12 +223,8 @@ class HybridPredictor:
 
         It is the hybrid model, during the warm-up too.
 
-        Raises
-        ------
-        ParameterError
-            With averaging: its model is not affine in the commands.
-        SignalError
-            If ``n < 1``, or the initial position is neither given nor known from a predicted window.
+        ParameterError with averaging, whose model is not affine in the commands; SignalError if ``n < 1``, or the
+        initial position is neither given nor known from a predicted window.
         """
         if self.settings.averaging:
             raise ParameterError("the operator needs the paper's model, averaging = false")
@@ -355,10 +329,7 @@ class HybridPredictor:
     def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> "HybridPredictor":
         """Return the predictor of :meth:`to_bytes`, given the ``disturbances`` that it was learned with.
 
-        Raises
-        ------
-        StateError
-            If the blob is foreign, truncated or of another version, or the number of disturbances differs.
+        StateError if the blob is foreign, truncated or of another version, or the number of disturbances differs.
         """
         meta, arrays, _ = unpack(_KIND, blob)
         with restoring(_KIND):
@@ -389,9 +360,6 @@ class HybridPredictor:
     def load(cls, path: str | Path, disturbances: Sequence[Disturbance] = ()) -> "HybridPredictor":
         """Return the predictor of :meth:`save`; :meth:`restart` then begins a warm-started run.
 
-        Raises
-        ------
-        StateError
-            If the file is not a saved predictor, or was learned with another number of disturbances.
+        StateError if the file is not a saved predictor, or was learned with another number of disturbances.
         """
         return cls.from_bytes(Path(path).read_bytes(), disturbances)
