@@ -9,7 +9,6 @@ operation.
 """
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from .errors import FmuError, ParameterError
@@ -66,16 +65,6 @@ class SampleClock(NamedTuple):
         after = SampleClock(T_s, self.k + n, *((0.0, 0.0) if reached else (since, carry)), end)
         n_latched = n + after.latched - self.latched
         return ClockStep(after, n, n_latched, T_s - self.since if self.latched else 0.0)
-
-    def state(self) -> list[float]:
-        """Return all fields as numbers."""
-        return list(map(float, self))
-
-    @classmethod
-    def from_state(cls, state: Sequence[float]) -> "SampleClock":
-        """Return the clock of a :meth:`state`."""
-        T_s, k, *times = state
-        return cls(T_s, int(k), *times)
 
 
 class ClockStep(NamedTuple):

@@ -6,7 +6,6 @@ process leaves ``.hybridsep-….tmp`` in the target's folder.
 """
 
 import errno
-import io
 import math
 import os
 import stat
@@ -73,17 +72,8 @@ def named_errors(path: str | Path, part: str | Path | None = None) -> Iterator[N
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
 
 
-@contextmanager
-def atomic_open_text(path: str | Path) -> Iterator[IO[str]]:
-    """Open a UTF-8 text file, line ends untranslated, as :func:`atomic_open` does."""
-    with atomic_open(path) as file:
-        text = io.TextIOWrapper(file, encoding="utf-8", newline="")
-        yield text
-        text.detach()  # what is buffered goes to the file, which stays open
-
-
 def write_whole(path: str | Path, content: bytes | str) -> None:
-    """Write a file of bytes, or of UTF-8 text, as :func:`atomic_open` does."""
+    """Write a file of bytes, or of UTF-8 text with its line ends, as :func:`atomic_open` does."""
     with atomic_open(path) as file:
         file.write(content.encode() if isinstance(content, str) else content)
 

@@ -88,16 +88,10 @@ class SepCompensator:
         self.restart(predictor.start, t_init=predictor.settings.warm_up)
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:
-        """Begin another run, at rest at ``start``; what was learned is kept (warm start).
+        """Begin another run, at rest at ``start``, m, or the first command; what was learned is kept (warm start).
 
-        Parameters
-        ----------
-        start : float, optional
-            Initial position, m; the first command if left out.
-        t_init : float
-            Warm-up, s, from the end of the lead-in, in which the physics model is used.
-        lead_in : int
-            Samples at rest before the trajectory, not learned.
+        ``lead_in``: samples at rest before the trajectory, not learned; ``t_init``: warm-up, s, from its end, in which
+        the physics model is used.
         """
         self._online: LookAhead | None = None
         predictor = self.predictor
@@ -126,18 +120,9 @@ class SepCompensator:
         Every plan goes on from the remainder of the last plan, which keeps the drive's limits and ends at ``x_d``. With
         ``compensate="off"`` a plan ends compensation, smoothly and within the preview. Where the remainder is larger
         than a new ``change_max``, it is the bound. ``following_error_max`` counts from the next sample on; 0 ends no
-        trip.
+        trip. These three, of :class:`~hybridsep.base.settings.CompensatorSettings`, can change.
 
-        Parameters
-        ----------
-        **settings
-            ``compensate``, ``change_max`` or ``following_error_max``, as in
-            :class:`~hybridsep.base.settings.CompensatorSettings`.
-
-        Raises
-        ------
-        ParameterError
-            If one is out of its range, or fixed. Nothing is changed.
+        ParameterError if one is out of its range, or fixed; nothing is changed.
         """
         fixed = [name for name in settings if name not in _TUNABLE]
         if fixed:
@@ -165,19 +150,9 @@ class SepCompensator:
         It is a :class:`~hybridsep.online.look_ahead.LookAhead` over this compensator, which begins at the first call
         after :meth:`restart`: there are predictions, errors and a state to save in it.
 
-        Parameters
-        ----------
-        x_d_ahead : float, m
-            Commanded position for ``preview`` samples later.
-        x_meas : float, m
-            Position measured now.
-        x_load : float, m
-            Load for ``preview`` samples later, as :meth:`plan` takes it; it counts from that of the first sample.
-
-        Raises
-        ------
-        SignalError
-            As :meth:`LookAhead.sample <hybridsep.online.look_ahead.LookAhead.sample>`.
+        ``x_d_ahead``, m: commanded position for ``preview`` samples later; ``x_meas``, m: position measured now;
+        ``x_load``, m: load for ``preview`` samples later, as :meth:`plan` takes it, counted from the first sample's.
+        SignalError as :meth:`LookAhead.sample <hybridsep.online.look_ahead.LookAhead.sample>`.
         """
         online = self._online
         if online is None:
@@ -189,27 +164,14 @@ class SepCompensator:
 
     @one_blas_thread
     def plan(self, x_d: ArrayLike, load: ArrayLike | None = None) -> PublishedWindow:
-        """Plan the next window.
+        """Plan the next window for the commanded positions ``x_d``, m, of the preview, ``(preview,)``.
 
         May be called again, with other commands, before :meth:`update`; the last call counts.
 
-        Parameters
-        ----------
-        x_d : (preview,) array_like, m
-            Commanded positions of the preview.
-        load : (preview,) array_like, m, optional
-            Force or torque on the axis over the preview, divided by the stiffness of its position loop, positive where
-            it pushes the axis forwards, counted from the start of the run: from a rigid-body model, gravity or a table.
-            The drive's model gets it beside the command, so plans make up for it; none if left out.
-
-        Returns
-        -------
-        PublishedWindow
-
-        Raises
-        ------
-        SignalError
-            If ``x_d`` or ``load`` has another length or is not finite, or the window's prediction diverges.
+        ``load``, m, ``(preview,)``: force or torque on the axis over the preview, divided by the stiffness of its
+        position loop, positive where it pushes the axis forwards, counted from the start of the run: from a rigid-body
+        model, gravity or a table. The drive's model gets it beside the command, so plans make up for it; none if left
+        out. SignalError if ``x_d`` or ``load`` has another length or is not finite, or the prediction diverges.
         """
         command = as_samples(x_d, "x_d", self.preview)
         loads = np.zeros(self.preview) if load is None else as_samples(load, "load", self.preview)
@@ -244,17 +206,10 @@ class SepCompensator:
 
     @one_blas_thread
     def update(self, x: ArrayLike) -> None:
-        """Learn from the measurement of the planned window.
+        """Learn from the measured positions ``x``, m, of the planned window, ``(Np,)``.
 
-        Parameters
-        ----------
-        x : (Np,) array_like, m
-            Measured positions; with ``averaging`` NaN where missing.
-
-        Raises
-        ------
-        SignalError
-            If nothing is planned, the length is another one or a value is not finite. Nothing is changed.
+        With ``averaging`` NaN where missing. SignalError if nothing is planned, the length is another one or a value is
+        not finite; nothing is changed.
         """
         pending = self._pending
         if pending is None:
@@ -300,10 +255,7 @@ class SepCompensator:
     def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> "SepCompensator":
         """Return the compensator of :meth:`to_bytes`, given the ``disturbances`` of its predictor.
 
-        Raises
-        ------
-        StateError
-            If the blob is foreign, truncated or of another version, or the number of disturbances differs.
+        StateError if the blob is foreign, truncated or of another version, or the number of disturbances differs.
         """
         meta, arrays, parts = unpack(_KIND, blob)
         with restoring(_KIND):

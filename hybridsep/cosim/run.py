@@ -1,6 +1,7 @@
 """Record of a run of a controller and a drive over a trajectory: signals, figures, file."""
 
 import csv
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import metrics
-from ..base.files import atomic_open, atomic_open_text
+from ..base.files import atomic_open, write_whole
 from ..base.signals import Array
 from ..online.look_ahead import SepState
 
@@ -206,9 +207,10 @@ def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
             map(repr, (column.astype(np.int64) if column.dtype == np.bool_ else column).tolist())
             for column in columns.values()
         ]
-        with atomic_open_text(path) as file:
-            writer = csv.writer(file)
-            writer.writerow(columns)
-            writer.writerows(zip(*texts, strict=True))
+        table = io.StringIO()
+        writer = csv.writer(table)
+        writer.writerow(columns)
+        writer.writerows(zip(*texts, strict=True))
+        write_whole(path, table.getvalue())
     else:
         raise ValueError(f"results are written as .csv or .npz, got {path.name!r}")

@@ -3,7 +3,7 @@
 import hashlib
 from pathlib import Path
 
-from ..base.files import COMMANDS, atomic_open_text
+from ..base.files import COMMANDS, write_whole
 from ..base.signals import Array
 from ..fmi.compile import no_native
 from ..fmi.spec import fmu_name
@@ -27,9 +27,8 @@ def fit_files(out: Path, name: str, *, compensator: bool = False) -> dict[str, P
 def write_commands(path: Path, x_d: Array, T_s: float, shown: DisplayUnits) -> None:
     """Write commands, m or rad, as a CSV that ``--trajectory`` takes, in the unit in which positions are shown."""
     factor, unit = shown.position
-    with atomic_open_text(path) as file:
-        file.write(f"# commands of a log, by hybridsep fit, to try with\nt [s],x_d [{unit}]\n")
-        file.writelines(f"{k * T_s:.9g},{position!r}\n" for k, position in enumerate((factor * x_d).tolist()))
+    rows = [f"{k * T_s:.9g},{position!r}\n" for k, position in enumerate((factor * x_d).tolist())]
+    write_whole(path, f"# commands of a log, by hybridsep fit, to try with\nt [s],x_d [{unit}]\n{''.join(rows)}")
 
 
 def sha256_of(path: Path) -> str:

@@ -137,12 +137,12 @@ class StageDrive:
     def state(self) -> list[float]:
         """Return ``[start, acting and last x_d, v_d, v, 5 numbers of the clock, z …, x_d within the dead time …]``."""
         moving = [self._acting, self._last_x_d, self._v_d, self._v]
-        return [self._start, *moving, *self._clock.state(), *self._z, *self._line]
+        return [self._start, *moving, *map(float, self._clock), *self._z, *self._line]
 
     def restore(self, state: list[float]) -> None:
         """Restore a :meth:`state`."""
         self._start, self._acting, self._last_x_d, self._v_d, self._v = state[:5]
-        self._clock = SampleClock.from_state(state[5:10])
+        self._clock = SampleClock(state[5], int(state[6]), *state[7:10])
         end = 10 + 2 * len(self._modes)
         self._z, self._line = list(state[10:end]), list(state[end:])
 

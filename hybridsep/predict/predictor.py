@@ -145,19 +145,9 @@ class HybridPredictor:
 
         May be called again, with other commands or another length, before :meth:`update`; the last call counts.
 
-        Parameters
-        ----------
-        x_d : (n,) array_like, m
-            Commanded positions of the next ``n ≥ 1`` samples; usually ``n = Np``.
-        path : (m,) array, m, optional
-            In a compensator, commands of its preview before they are modified; ``x_d`` if left out.
-        scales : FeatureScales, optional
-            With averaging: scales of the features, in a compensator; from ``x_d`` if left out.
-
-        Raises
-        ------
-        SignalError
-            If ``x_d`` is empty, not one-dimensional or not finite.
+        ``x_d``, (n,), m: commanded positions of the next ``n ≥ 1`` samples, usually ``n = Np``. From a compensator:
+        ``path``, (m,), m: commands of its preview before they are modified; with averaging ``scales`` of the features.
+        Both from ``x_d`` if left out. SignalError if ``x_d`` is empty, not one-dimensional or not finite.
         """
         command, state = as_samples(x_d, "x_d"), self.state
         n, late = len(command), len(state.late)

@@ -37,10 +37,7 @@ def _folded(factor: Array, rows: Array, n_triangular: int = 0) -> Array:
     ``factor``, (n, n), column-major: ``R``; ``rows``, (m, n); ``n_triangular``: number of last rows that are upper
     trapezoidal themselves, which saves the work on their zeros.
     """
-    found, _, _, info = lapack.dtpqrt(n_triangular, min(_COLUMNS_AT_ONCE, rows.shape[1]), factor, rows)
-    if info != 0:  # an illegal argument, a fault of this module
-        raise AssertionError(f"dtpqrt returned info = {info}")
-    return np.asarray(found)
+    return np.asarray(lapack.dtpqrt(n_triangular, min(_COLUMNS_AT_ONCE, rows.shape[1]), factor, rows)[0])
 
 
 class PenalisedSolution(NamedTuple):
@@ -89,11 +86,6 @@ class RidgeRegression:
         weights, _ = lapack.dtrtrs(self.factor[:-1, :-1], self.factor[:-1, -1])
         weights.flags.writeable = False
         return np.asarray(weights)
-
-    @property
-    def residual_sum(self) -> float:
-        """``Σ (target − wᵀφ)² + λ‖w‖²`` at the optimum, m²."""
-        return float(self.factor[-1, -1] ** 2)
 
     @property
     def target_square(self) -> float:

@@ -189,7 +189,7 @@ class LookAheadStream(LibraryStream):
         return shown
 
     def save(self) -> bytes:
-        meta = {"clock": self._clock.state(), "latched": (*self._latched, self._was_reset), "values": self._values}
+        meta = {"clock": self._clock, "latched": (*self._latched, self._was_reset), "values": self._values}
         return pack(f"stream {self.model}", meta, {}, {"core": self._look_ahead.to_bytes()})
 
     def restore(self, blob: bytes) -> None:
@@ -198,7 +198,7 @@ class LookAheadStream(LibraryStream):
             self._look_ahead = LookAhead.from_bytes(
                 parts["core"], HybridPredictor if self._kind == PREDICTOR else SepCompensator
             )
-        self._clock, self._latched = SampleClock.from_state(meta["clock"]), tuple(meta["latched"][:3])
+        self._clock, self._latched = SampleClock(*meta["clock"]), tuple(meta["latched"][:3])
         self._values, self._was_reset = meta["values"], meta["latched"][3]
 
 

@@ -13,7 +13,7 @@ from string import Template
 from typing import Any
 
 from hybridsep.base.errors import LogError
-from hybridsep.base.files import atomic_open_text
+from hybridsep.base.files import write_whole
 
 _WORSE, _SHIFT, _FRICTION, _RESIDUAL = 1.03, 0.05, 0.3, 0.5
 """From which on an axis is looked at: error relative to the best baseline; relative changes of the first mode's
@@ -104,9 +104,7 @@ def write_page(rows: Sequence[Mapping[str, Any]], page: Path, results: Path) -> 
         first=_first(axes, page, results),
         data=data,
     )
-    page.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_open_text(page) as file:
-        file.write(text)
+    write_whole(page, text)
 
 
 def _packed(axis: Course, page: Path, results: Path) -> dict[str, Any]:

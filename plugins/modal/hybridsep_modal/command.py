@@ -48,7 +48,7 @@ def modal(
     """
     from hybridsep.app.console import progress_bar
     from hybridsep.base.errors import ParameterError
-    from hybridsep.base.files import atomic_open_text
+    from hybridsep.base.files import write_whole
     from hybridsep.machines.machine import checked_name, machine_name, machine_text
 
     from .figure import response_figure
@@ -67,8 +67,7 @@ def modal(
     if out is not None:
         deviations = [f"{e.name} = {e.value:.6g} ± {e.std:.2g}{_unit(e.unit)}" for e in found.parameters]
         comments = [f"Identified by hybridsep modal from {file.name}.", *deviations, *found.findings]
-        with atomic_open_text(out) as text:
-            text.write(machine_text(found.machine(machine, f"Axis identified from {file.name}"), comments))
+        write_whole(out, machine_text(found.machine(machine, f"Axis identified from {file.name}"), comments))
     if as_json:
         typer.echo(json.dumps(found.summary(), indent=2))
         return
