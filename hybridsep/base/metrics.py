@@ -65,8 +65,7 @@ def rms(error: ArrayLike) -> float:
 
 def known_rms(error: Array) -> float:
     """Return the RMS of the samples that are known, not NaN; NaN if there are none."""
-    known = error[~np.isnan(error)]
-    return rms(known) if known.size else math.nan
+    return ErrorSize.of(error).rms
 
 
 def largest(error: ArrayLike) -> float:

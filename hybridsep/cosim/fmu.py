@@ -125,20 +125,9 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     FmuError if the archive cannot be read, is no FMI 2.0 or 3.0 co-simulation FMU, has no library for this platform, or
     refuses to be instantiated. A library's code runs in this process, and a damaged one may end it.
 
-    Parameters
-    ----------
-    path : str or Path
-        The archive.
-    instance_name : str, optional
-        Name in log messages; the archive's stem if left out.
-
-    Attributes
-    ----------
-    description : fmpy's model description
-    variables : dict
-        fmpy's variables by name.
-    log : list of (status, message)
-        Messages of the FMU's logger; at most the last 1000.
+    ``path`` is the archive, ``instance_name`` the name in log messages, the archive's stem if left out. ``description``
+    is fmpy's model description, ``variables`` has fmpy's variables by name, and ``log`` the messages of the FMU's
+    logger, ``(status, message)``, at most the last 1000.
     """
 
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
@@ -247,10 +236,8 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
 
     def get(self, name: str) -> Any:
         """Return one variable; of an array a list."""
-        variable = self._variable(name)
-        call, values = self._prepared("Get", [variable])
-        self._call(call)
-        return list(values) if variable.shape else values[0]
+        values = self.reader([name])()
+        return values if self.variables[name].shape else values[0]
 
     def real_stepper(self, names: Sequence[str]) -> Callable[[Sequence[float], float, float], None]:
         """Return a function of values, ``t`` and ``h`` that sets these real numbers, in one FMI call, and steps."""

@@ -172,9 +172,8 @@ class Run:
         for name, signal in signals.items():
             figures[f"{name}_rms_um"] = 1e6 * metrics.rms(signal)
             figures[f"{name}_max_um"] = 1e6 * metrics.largest(signal)
-        peaks = metrics.peak_derivatives(self.x_dm, self.T_s)
-        for name, peak in zip(("velocity_m_s", "acceleration_m_s2", "jerk_m_s3"), peaks, strict=True):
-            figures[f"peak_{name}"] = peak
+        names = ("peak_velocity_m_s", "peak_acceleration_m_s2", "peak_jerk_m_s3")
+        figures |= dict(zip(names, metrics.peak_derivatives(self.x_dm, self.T_s), strict=True))
         figures |= {f"share_{one.name.lower()}": float(np.mean(self.state == one)) for one in SepState}
         return {**figures, "n_samples": len(self.t)}
 

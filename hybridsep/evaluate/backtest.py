@@ -87,25 +87,16 @@ def backtest(
 ) -> Backtest:
     """Replay a log.
 
-    The predictor goes on from its present state; call its ``restart`` before for another run with the weights kept.
+    The predictor goes on from its present state, and learns the log on the way; call its ``restart`` before for another
+    run with the weights kept.
 
-    Parameters
-    ----------
-    predictor : HybridPredictor
-        It learns the log on the way.
-    x_d, x_meas : (n,) array_like, m
-        Commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it is missing. Or a
-        :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments, or a table that is read as one.
-    starts : sequence of int
-        First samples of the segments, which gaps separate: another run begins with each, and what was learned is kept.
-    progress : callable, optional
-        Called with the fraction done after each window.
+    ``x_d``, ``x_meas``, (n,), m: commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it
+    is missing. Or a :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments, or a table that is read
+    as one. ``starts``: first samples of the segments, which gaps separate: another run begins with each, and what was
+    learned is kept. ``progress`` is called with the fraction done after each window.
 
-    Raises
-    ------
-    SignalError
-        If the samples are empty, of different lengths or not finite; the predictor is unchanged then. If the prediction
-        diverges.
+    SignalError if the samples are empty, of different lengths or not finite, the predictor is unchanged then; or if the
+    prediction diverges.
     """
     if is_table(x_d):
         x_d = read_log(cast("Table", x_d), T_s=predictor.T_s)
@@ -176,9 +167,7 @@ def replayed_run(found: Backtest, x_d: Array, x_meas: Array, T_s: float, Np: int
         x_dm=x_d[:n],
         x=np.full(n, np.nan),
         x_meas=x_meas[arrived],
-        x_pb=found.x_pb[arrived],
-        x_h=found.x_h[arrived],
-        x_h_std=found.x_h_std[arrived],
+        **{name: getattr(found, name)[arrived] for name in ("x_pb", "x_h", "x_h_std")},
         state=np.where(found.active[arrived], SepState.HYBRID, SepState.PHYSICS),
         T_s=T_s,
         Np=Np,

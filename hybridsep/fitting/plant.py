@@ -73,12 +73,9 @@ class _Disturbed(NamedTuple):
 
     def entries(self) -> dict[str, Any]:
         """Return the entries of the section ``[plant]``."""
-        return {
-            "f": float(f"{self.f:.5g}"),
-            "kappa": float(f"{self.kappa:.5g}"),
-            "v_friction": float(f"{self.v_friction:.5g}"),
-            "mode": [{name: float(f"{value:.7g}") for name, value in asdict(one).items()} for one in self.model.modes],
-        }
+        own = {name: float(f"{getattr(self, name):.5g}") for name in ("f", "kappa", "v_friction")}
+        modes = [{name: float(f"{value:.7g}") for name, value in asdict(one).items()} for one in self.model.modes]
+        return {**own, "mode": modes}
 
 
 class _Piece:

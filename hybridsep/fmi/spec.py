@@ -166,7 +166,7 @@ def _starts(machine: Machine, model: str) -> tuple[dict[str, Any], tuple[dict[st
         return parameters | machine.physics.spring_mass_damper.values(), ()
     identified = isinstance(machine.plant, IdentifiedSection)
     chosen = {
-        "friction_on": "command" if isinstance(machine.plant, IdentifiedSection) else machine.plant.friction_on,
+        "friction_on": "command" if identified else parameters["friction_on"],
         "input_hold": machine.physics.input_hold if identified else "zoh",
     }
     parameters = {"v_friction": PARAMETERS["v_friction"].default, **parameters}

@@ -113,6 +113,7 @@ _RUNNING_ERRORS = [
 
 
 def _parameter(parameter: Parameter, start: Value, *, group: str, label: str | None = None) -> Variable:
+    as_declared = ("display_unit", "minimum", "maximum", "nonzero", "automatic", "learned")
     return Variable(
         label or parameter.name,
         _KINDS[parameter.kind],
@@ -121,15 +122,10 @@ def _parameter(parameter: Parameter, start: Value, *, group: str, label: str | N
         parameter.description,
         start=start,
         unit=parameter.unit if parameter.kind is float else None,
-        display_unit=parameter.display_unit,
-        minimum=parameter.minimum,
-        maximum=parameter.maximum,
-        nonzero=parameter.nonzero,
-        automatic=parameter.automatic,
         items=parameter.choices,
         item_meanings=parameter.meanings,
-        learned=parameter.learned,
         group=group,
+        **{name: getattr(parameter, name) for name in as_declared},
     )
 
 

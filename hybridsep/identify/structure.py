@@ -1,7 +1,7 @@
 """Structures of ``G_pb`` that are tried on a log, and their parameters as modes of eq. (15)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -120,15 +120,11 @@ def lag_mode(tau: float, gain: float = 1.0) -> Mode:
     return Mode(f_n=1 / (2 * np.pi * tau), zeta=1.0, alpha=gain / tau**2, beta=gain / tau)
 
 
-STRUCTURES = (
-    *(Structure(0, unit_gain=unit) for unit in (True, False)),
-    *(Structure(0, lag=True, unit_gain=unit) for unit in (True, False)),
-    *(Structure(1, unit_gain=unit) for unit in (True, False)),
-    *(Structure(1, zero=True, unit_gain=unit) for unit in (True, False)),
-    *(Structure(1, lag=True, zero=True, unit_gain=unit) for unit in (True, False)),
-    *(Structure(2, zero=True, unit_gain=unit) for unit in (True, False)),
-    *(Structure(3, zero=True, unit_gain=unit) for unit in (True, False)),
+_FORMS = (
+    *(Structure(0), Structure(0, lag=True), Structure(1), Structure(1, zero=True)),
+    *(Structure(1, lag=True, zero=True), Structure(2, zero=True), Structure(3, zero=True)),
 )
+STRUCTURES = tuple(replace(form, unit_gain=unit_gain) for form in _FORMS for unit_gain in (True, False))
 """Structures by number of parameters, the simplest first."""
 
 

@@ -15,8 +15,8 @@ from ..base.signals import Array, Given, check_same_index, given_column, index_v
 from .names import known_names
 from .source import ArraysSource, past_midnights
 from .text import with_own_names
+from .units import TIME_UNITS
 
-_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # durations, s, of the units of Arrow's times
 _OWN = (TypeError, AttributeError, LookupError)  # errors whose messages tell of the library's own names
 
 
@@ -254,7 +254,7 @@ class ParquetSource(ArraysSource):
             if name in self.stamps:
                 whole = self._arrow.int32() if kind.bit_width == 32 else self._arrow.int64()
                 counts = values.cast(whole).to_numpy()
-                since = np.asarray((counts - counts[:1]) * _UNITS[kind.unit], dtype=np.float64)
+                since = np.asarray((counts - counts[:1]) * TIME_UNITS[kind.unit].factor, dtype=np.float64)
                 return past_midnights(since, 86_400.0) if types.is_time(kind) else since
             if types.is_decimal(kind):
                 values = values.cast(self._arrow.float64())

@@ -39,13 +39,12 @@ class DisplayUnits:
     """Units in which a log's positions and their errors are printed and drawn, each a factor from SI and a name."""
 
     position: tuple[float, str]
-    small: tuple[float, str]  # of errors below ``limit``
-    large: tuple[float, str]  # and above
+    small: tuple[float, str]  # of errors below ``limit``; larger ones are in that of positions
     limit: float = 1e4  # error in the small unit
 
     def error(self, size: float) -> tuple[float, str]:
         """Return factor and name of the unit of errors of about ``size``, m or rad."""
-        return self.large if self.small[0] * abs(size) >= self.limit else self.small
+        return self.position if self.small[0] * abs(size) >= self.limit else self.small
 
     def words(self, size: float, form: str = ".3g") -> str:
         """Return an error, m or rad, with its unit."""
@@ -53,13 +52,13 @@ class DisplayUnits:
         return f"{factor * size:{form}} {name}"
 
 
-_METRIC = DisplayUnits((1e3, "mm"), (1e6, "µm"), (1e3, "mm"))
-_ANGULAR = DisplayUnits((1e3, "mrad"), (1e6, "µrad"), (1e3, "mrad"))
+_METRIC = DisplayUnits((1e3, "mm"), (1e6, "µm"))
+_ANGULAR = DisplayUnits((1e3, "mrad"), (1e6, "µrad"))
 _INCH, _DEGREE, _TURN = (1.0 / POSITION_UNITS[name].factor for name in ("in", "deg", "rev"))
 _SHOWN = {
-    "in": DisplayUnits((_INCH, "in"), (1e6 * _INCH, "µin"), (_INCH, "in")),
-    "deg": DisplayUnits((_DEGREE, "deg"), (1e3 * _DEGREE, "mdeg"), (_DEGREE, "deg"), 1e3),
-    "rev": DisplayUnits((_TURN, "rev"), (1e3 * _TURN, "mrev"), (_TURN, "rev"), 1e3),
+    "in": DisplayUnits((_INCH, "in"), (1e6 * _INCH, "µin")),
+    "deg": DisplayUnits((_DEGREE, "deg"), (1e3 * _DEGREE, "mdeg"), 1e3),
+    "rev": DisplayUnits((_TURN, "rev"), (1e3 * _TURN, "mrev"), 1e3),
 }
 
 

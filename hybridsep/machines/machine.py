@@ -51,9 +51,8 @@ class Machine(FileSection):
     """
 
     def __repr__(self) -> str:
-        settings = self.predictor_settings
-        shown = {"T_s": self.T_s, **{name: getattr(settings, name) for name in ("Np", "p", "q")}}
-        return f"Machine({self.name!r}, {', '.join(f'{name} = {value!r}' for name, value in shown.items())})"
+        own = self.predictor_settings
+        return f"Machine({self.name!r}, T_s = {self.T_s!r}, Np = {own.Np}, p = {own.p}, q = {own.q})"
 
     def check(self) -> None:
         """Raise ParameterError if plant and physics, or the compensator's entries, are inconsistent."""
@@ -299,12 +298,11 @@ def machine_from_table(content: Mapping[str, Any]) -> Machine:
 
 def check_interval(name: str, T_s: float, axis: Machine) -> None:
     """Raise ParameterError if a file's sampling interval is not the machine's."""
-    if abs(T_s - axis.T_s) <= 0.01 * axis.T_s:
-        return
-    raise ParameterError(
-        f"{name} is sampled every {T_s:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; resample the file, say "
-        "its unit of time in the column's name, or correct T_s"
-    )
+    if abs(T_s - axis.T_s) > 0.01 * axis.T_s:
+        raise ParameterError(
+            f"{name} is sampled every {T_s:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; resample the file, "
+            "say its unit of time in the column's name, or correct T_s"
+        )
 
 
 def check_unit(name: str, log: "Log", axis: Machine) -> None:

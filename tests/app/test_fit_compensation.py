@@ -137,7 +137,7 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     assert sizes["j_max"] == pytest.approx([one] * 3, rel=0.05)  # it does not bind
     assert found.costs.advised == {"change_max": pytest.approx(2 * change_max)}
     assert found.costs.advised_error.rms == two
-    said = " ".join(found.lines(DisplayUnits((1e3, "mm"), (1e6, "µm"), (1e3, "mm"))))
+    said = " ".join(found.lines(DisplayUnits((1e3, "mm"), (1e6, "µm"))))
     assert f"If the drive allows it: --change_max {2 * change_max:.4g}, with which about" in said
     assert f" is left of {1e6 * one:.4g} µm" in said
     beyond = f"{0.5e6 * change_max:.4g} µm of it cannot be compensated."
