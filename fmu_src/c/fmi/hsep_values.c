@@ -45,8 +45,7 @@ HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep
     return HSEP_OK;
 }
 
-/* Check beside it that they may be set now: inputs at any time, parameters until the initialization has ended, tunable
- * ones later too. */
+/* Check beside it that they may be set now. */
 static hsep_status values_check_set(const hsep_instance *instance, const hsep_access *access)
 {
     const hsep_context *context = &instance->context;

@@ -357,9 +357,6 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
         slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
         return 0;
     }
-    const hsep_real alpha = slacks_move(&a.slacks);
-    for (hsep_int j = 0; j < a.n; j++) {
-        a.problem.x[j] += alpha * a.dx[j];
-    }
+    hsep_axpy(a.problem.x, slacks_move(&a.slacks), a.dx, a.n);
     return 0;
 }

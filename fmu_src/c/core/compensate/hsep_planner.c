@@ -306,14 +306,10 @@ static void planner_pin(hsep_planner *self)
     hsep_real *v = hsep_planner_linear(self);
     self->solved = hsep_knots_of(n - first, 0);
     for (hsep_int i = 0; i < first; i++) {
-        for (hsep_int j = first; j < n; j++) {
-            v[j] -= P[j - i] * rest[i];
-        }
+        hsep_axpy(v + first, -rest[i], P + (first - i), n - first);
         P += n - i;
     }
-    for (hsep_int j = first; j < n; j++) {
-        v[j - first] = v[j];
-    }
+    memmove(v, v + first, (size_t)(n - first) * sizeof(hsep_real));
 }
 
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
@@ -380,9 +376,7 @@ static void planner_take(hsep_planner *self, const hsep_real x[])
 {
     hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self), *c = hsep_planner_problem(self).c;
     hsep_knots_widen(&self->solved, x, c);
-    for (hsep_int j = 0; j < self->solved.n; j++) {
-        rest[j] += c[j];
-    }
+    hsep_axpy(rest, 1.0, c, self->solved.n);
 }
 
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance)
@@ -580,9 +574,7 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
             plan[i] = 3.0 * pole * plan[i - 1] - 3.0 * pole * pole * plan[i - 2] + pole * pole * pole * plan[i - 3];
         }
     }
-    for (hsep_int i = 0; i < self->count; i++) {
-        last[i] += share * own[i];
-    }
+    hsep_axpy(last, share, own, self->count);
 }
 
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])

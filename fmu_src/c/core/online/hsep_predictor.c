@@ -1,6 +1,7 @@
 #include "hsep_predictor.h"
 
 #include "hsep_math.h"
+#include "hsep_vector.h"
 
 #include <string.h>
 
@@ -144,13 +145,9 @@ static void predictor_start(hsep_predictor *self)
         work[j] = e[j] - e_h[j];
     }
     if (hsep_start_estimate(motion, command, work)) {
-        for (hsep_int j = 0; j < Np; j++) {
-            e[j] += past_x[late + j];
-        }
+        hsep_axpy(e, 1.0, past_x + late, Np);
         hsep_start_apply(motion, command, past_x, hsep_at(self, self->ahead_pb), hsep_predictor_physics(self));
-        for (hsep_int j = 0; j < Np; j++) {
-            e[j] -= past_x[late + j];
-        }
+        hsep_axpy(e, -1.0, past_x + late, Np);
         hsep_averaged_begin_in_motion(averaged, command + late, past_x + late);
     }
 }

@@ -3,6 +3,7 @@
 #include "hsep_math.h"
 #include "hsep_predict_constants.h"
 #include "hsep_regression.h"
+#include "hsep_vector.h"
 
 #include <string.h>
 
@@ -102,7 +103,7 @@ static void start_fold(hsep_start *self, const hsep_real e[])
 HSEP_API int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], const hsep_real e[])
 {
     const hsep_int all = self->n_states + self->dead_time;
-    const hsep_real step = start_step(self, x_d), *weights = hsep_at(self, self->weights);
+    const hsep_real step = start_step(self, x_d);
     hsep_real *state = hsep_at(self, self->state), *response = hsep_at(self, self->response);
     hsep_real seen = 0.0, left = 0.0;
     hsep_int known = 0;
@@ -130,9 +131,7 @@ HSEP_API int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], const 
         return 0;
     }
     start_fold(self, e);
-    for (hsep_int i = 0; i < self->n_states; i++) {
-        state[i] += weights[i];
-    }
+    hsep_axpy(state, 1.0, hsep_at(self, self->weights), self->n_states);
     start_respond(self, step, response, self->n + self->Np);
     return 1;
 }
@@ -149,8 +148,6 @@ HSEP_API void hsep_start_apply(
     for (hsep_int k = 0; k < self->n; k++) {
         x_pb[self->n - 1 - k] += response[k];
     }
-    for (hsep_int i = 0; i < self->Np; i++) {
-        ahead[i] += response[self->n + i];
-    }
+    hsep_axpy(ahead, 1.0, response + self->n, self->Np);
     hsep_physics_add(physics, hsep_part_const(self, self->trial));
 }
