@@ -17,8 +17,9 @@ from ..base.signals import Array
 from .qp import ROUNDING, DriveBounds
 from .splines import N_DECIDED, SplineBasis
 
-_TRIES, _SHORTER = 8, 0.8
-"""Lengths of the way from the last stop to a plan that are tried, and their ratio."""
+_TRIES = 12
+"""Lengths of the way from the last stop to a plan that are tried, all of it first. With 0.8 of the last one each time,
+and none where these fail, an axis with 50 ms of look-ahead stood 6 mm off: the next window asked for the same."""
 
 _FADE = 10.0
 """Time constants, in a horizon, with which the change fades behind a plan that has no stop."""
@@ -58,14 +59,17 @@ class Stop:
         of_old, own = self.rows @ old, self.rows @ (old - self._stopping @ old[:n])
         low, high = np.minimum(low, of_old) - ROUNDING, np.maximum(high, of_old) + ROUNDING
         start, way = of_old - own, self.rows @ now - (of_old - own)
-        length = 1.0
+        # Lengths and shares that keep all bounds are a convex set with the last stop in it: the longest by bisection
+        length, share, too_long, tried = 0.0, 1.0, 1.0, 1.0
         for _ in range(_TRIES):
-            share = _share(start + length * way, own, low, high)
-            if share is not None:
+            found = _share(start + tried * way, own, low, high)
+            if found is None:
+                too_long = tried
+            else:
+                length, share = tried, found
+            if length == 1.0:
                 break
-            length *= _SHORTER
-        else:
-            length, share = 0.0, 1.0
+            tried = 0.5 * (length + too_long)
         shared = old[:n] + length * (plan[:n] - old[:n])
         stop = self._stopping @ shared + share * (old - self._stopping @ old[:n])
         return (plan if length == 1.0 else self._fading(shared, len(plan))), stop

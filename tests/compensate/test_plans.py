@@ -289,13 +289,14 @@ def test_a_stop_takes_the_least_of_the_limits(limits: Limits | None) -> None:
     assert np.all(found[last:] == found[last - 1])
 
 
-def test_a_plan_without_a_stop_is_shortened_to_the_last_one_and_fades() -> None:
+@pytest.mark.parametrize("speed", [0.7, 0.99])  # relative to the limit: of the second one a fiftieth is left
+def test_a_plan_without_a_stop_is_shortened_to_the_last_one_and_fades(speed: float) -> None:
     stop, bounds = stop_of(change_max=1e-2)
     n = N_DECIDED + stop.n_shared
-    # A change that gathers half of the largest velocity, under a command that has 0.7 of it
+    # A change that gathers half of the largest velocity
     k = np.maximum(0.0, np.arange(N_DECIDED + 96) - N_DECIDED)
     plan = 0.5 * 0.2 * LIMITS.acceleration * (T_S * SPACING * k) ** 2
-    step = 0.7 * LIMITS.velocity * T_S
+    step = speed * LIMITS.velocity * T_S
     ramp = step * np.arange(-2.0, PREVIEW + 1, dtype=np.float64)
     before, command = np.split(ramp, [3])
     low, high = bounds.hard(command, before, REST)
@@ -303,7 +304,10 @@ def test_a_plan_without_a_stop_is_shortened_to_the_last_one_and_fades() -> None:
     rows = stop.rows @ found
     assert np.all(rows >= low - 1e-8)
     assert np.all(rows <= high + 1e-8)
-    assert 0.0 < np.max(np.abs(carried[:n])) < np.max(np.abs(plan[:n]))
+    length = carried[n - 1] / plan[n - 1]
+    moves = np.abs(rows) > 1e-12  # the last stop is nothing
+    longest = length * np.min((np.where(rows > 0.0, high, low) / np.where(moves, rows, 1.0))[moves])
+    assert longest - 2.0**-11 < length <= longest + 1e-8
     assert np.max(np.abs(carried[-5:])) < 0.1 * np.max(np.abs(carried))
 
 

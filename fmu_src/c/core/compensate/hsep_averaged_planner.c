@@ -549,7 +549,6 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         if (self->follows) {
             averaged_planner_copy(self, hsep_at(self, self->best), rest);
             memset(hsep_at(self, self->change), 0, (size_t)self->m * sizeof(hsep_real));
-            hsep_planner_follow_friction(planner);
             planner->change = self->bound;
         }
         self->gains = self->follows;

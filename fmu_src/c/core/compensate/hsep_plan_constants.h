@@ -45,8 +45,7 @@
 #define HSEP_PLANNING_PINNED_AVERAGED 24
 
 /* hybridsep/compensate/stop.py */
-#define HSEP_STOP_TRIES 8
-#define HSEP_STOP_SHORTER 0.8
+#define HSEP_STOP_TRIES 12
 #define HSEP_STOP_FADE 10.0
 #define HSEP_STOP_STILL 1e-12
 /* clang-format on */

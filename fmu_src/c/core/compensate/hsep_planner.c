@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#define HSEP_STOP_WORK 250.0 /* multiply-adds for each sample of the preview to carry out a plan */
+#define HSEP_STOP_WORK 300.0 /* multiply-adds for each sample of the preview to carry out a plan */
 
 /* Stops of plans that are longer than the preview: behind the preview a plan takes the command to go on at its last
  * velocity. What comes may be another command, so each plan has a stop beside it: it shares the splines that are
@@ -248,11 +248,6 @@ static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows
     hsep_real *c = hsep_planner_problem(self).c;
     hsep_knots_widen(&self->solved, x, c);
     hsep_splines_rows(hsep_planner_splines(self), c, planner_first(self), rows);
-}
-
-HSEP_API void hsep_planner_follow_friction(hsep_planner *self)
-{
-    memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(hsep_real));
 }
 
 HSEP_API void hsep_planner_change(hsep_planner *self)
@@ -539,8 +534,7 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     const size_t shared = (size_t)first * sizeof(hsep_real);
     hsep_real *last = hsep_at(self, self->last), *own = hsep_at(self, self->own), *now = hsep_at(self, self->now);
     hsep_real *start = hsep_at(self, self->start), *way = hsep_at(self, self->way);
-    hsep_real *own_rows = hsep_at(self, self->own_rows), length = 1.0, share = 1.0;
-    int tries = 0;
+    hsep_real *own_rows = hsep_at(self, self->own_rows), length = 0.0, share = 1.0, too_long = 1.0, tried = 1.0;
     memcpy(own, last, shared);
     stop_behind(self, own);
     for (hsep_int i = 0; i < self->count; i++) {
@@ -556,12 +550,15 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
         start[r] -= own_rows[r];
         way[r] -= start[r];
     }
-    for (; tries < HSEP_STOP_TRIES && !stop_share(self, length, &share); tries++) {
-        length *= HSEP_STOP_SHORTER;
-    }
-    if (tries == HSEP_STOP_TRIES) { /* the last stop goes on */
-        length = 0.0;
-        share = 1.0;
+    for (int tries = 0; tries < HSEP_STOP_TRIES && length < 1.0; tries++) { /* convex, with the last stop in it */
+        hsep_real found = 0.0;
+        if (stop_share(self, tried, &found)) {
+            length = tried;
+            share = found;
+        } else {
+            too_long = tried;
+        }
+        tried = 0.5 * (length + too_long);
     }
     for (hsep_int i = 0; i < first; i++) {
         last[i] += length * (plan[i] - last[i]);
