@@ -18,6 +18,7 @@ from ..identify.output_error import in_time
 from ..logs.checks import resolution
 from ..logs.units import DisplayUnits
 from ..machines.machine import Machine
+from ..model.physics import least_look_ahead
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from .replay import Recording, beginnings, replay
@@ -49,7 +50,7 @@ _CHANGED = ("acceleration", "jerk", "change_max")  # entries of ``[drive_limits]
 FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to say what it costs
 _GAIN = 0.05  # relative gain from which on a limit twice as large, or a longer look-ahead, is advised
 
-_TRIED_MAX = 10_000  # leading samples on which a compensator is tried
+_TRIED_MAX, _WINDOWS_MAX = 10_000, 300  # leading samples, and windows, in which a compensator is tried, at most
 _AHEAD = (0.025, 0.05, 0.1, 0.2, 0.4)  # look-aheads, s, that are tried beside the machine's own and the model's
 _DEMANDING = 2000  # most samples of the stretch on which limits and look-aheads are tried
 _LITTLE = 0.01  # share of the error without compensation below which errors are alike
@@ -202,6 +203,16 @@ class LookAheads:
             return None
         return next(one for size, one in sizes if (1.0 - _GAIN) * size <= best)
 
+    def shortest(self, least: int) -> int:
+        """Return the shortest of at least so many samples that leaves as little as the machine's, if it is half of it.
+
+        Windows follow from it, and what is measured is older in longer ones.
+        """
+        now = next(one.left for one in self.tried if one.preview == self.chosen)
+        most = max(now, _LITTLE * self.off) / (1.0 - _GAIN)
+        found = next(one.preview for one in self.tried if one.preview >= least and one.left <= most)
+        return found if 2 * found <= self.chosen else self.chosen
+
     def lines(self) -> list[str]:
         """Return the look-ahead that is advised, and its gain, in words; empty where the machine's gains as much."""
         now = next(one for one in self.tried if one.preview == self.chosen)
@@ -296,11 +307,26 @@ def _words(error: ErrorSize, shown: DisplayUnits) -> str:
     return f"{shown.words(error.rms, '.4g')} (largest {shown.words(error.largest, '.4g')})"
 
 
+def to_shorten(machine: Machine, recordings: Sequence[Recording]) -> LookAheads | None:
+    """Return look-aheads tried, of which a shorter one than the machine's may do; None where there is none to try."""
+    if machine.drive_limits is None or machine.look_ahead < 2 * least_look_ahead(machine.T_s):
+        return None
+    stretch = Stretch.of(machine, recordings)
+    return None if stretch is None else stretch.look_aheads()
+
+
 def expected_tracking(
-    machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
+    machine: Machine,
+    recordings: Sequence[Recording],
+    tried: LookAheads | None,
+    progress: Callable[[float], object],
 ) -> Tracking:
-    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost."""
-    allowed, first = machine.compensator_settings, beginnings(recordings, _TRIED_MAX)
+    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost.
+
+    ``tried``: of :func:`to_shorten`, if the machine has one of its look-aheads.
+    """
+    most = min(_TRIED_MAX, _WINDOWS_MAX * machine.compensator_predictor.Np)
+    allowed, first = machine.compensator_settings, beginnings(recordings, most)
     settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
     judged = {model: _expected(machine, one, first) for model, one in settings.items()}
     progress(0.8)
@@ -311,7 +337,10 @@ def expected_tracking(
     }
     stretch = Stretch.of(machine, recordings)
     costs = stretch.limit_costs() if stretch and bound.get("hybrid") else None
-    ahead = stretch.look_aheads() if stretch else None
+    if tried and any(one.preview == allowed.preview for one in tried.tried):
+        ahead: LookAheads | None = replace(tried, chosen=allowed.preview or tried.chosen)
+    else:
+        ahead = stretch.look_aheads() if stretch else None
     progress(1.0)
     without = max((one.without for one in judged.values()), key=len)
     none, physics, hybrid = map(ErrorSize.of, (without, *(one.compensated for one in judged.values())))

@@ -52,6 +52,11 @@ class Mode:
         return 2 * np.pi * self.f_n
 
 
+def least_look_ahead(T_s: float) -> int:
+    """Return the least samples ahead that plans are made for: 0.2 s, which count as 100 at least, and 200 at most."""
+    return min(max(100, round(0.2 / T_s)), 200)
+
+
 @dataclass(frozen=True)
 class ModalModel:
     """Linear, causal, stable drive model: a sum of modes with input dead time, eq. (15).
@@ -126,7 +131,7 @@ class ModalModel:
 
         A change of the command must act within its plan: three times the time in which the response to a step, dead
         time included, first reaches 95 % of its end, or 1.5 periods of the lowest mode that swings, ζ < 1, and adds 5 %
-        somewhere, and 0.2 s, which count as 100 samples at least, and 200 at most.
+        somewhere, and :func:`least_look_ahead`.
 
         ``T_s``, s, and ``input_hold`` are as of :meth:`discretise`.
         """
@@ -141,8 +146,7 @@ class ModalModel:
         seen = min(0.05 * abs(self.dc_gain), max(peaks))
         swinging = [mode for mode, peak in zip(self.modes, peaks, strict=True) if peak >= seen and mode.zeta < 1.0]
         periods = [math.ceil(1.5 / mode.f_n / T_s) for mode in swinging]
-        least = min(max(100, round(0.2 / T_s)), 200)
-        return min(_LOOK_AHEAD_MAX, max(least, 3 * rise, *periods))
+        return min(_LOOK_AHEAD_MAX, max(least_look_ahead(T_s), 3 * rise, *periods))
 
     def state_space(self) -> tuple[Array, Array, Array]:
         """Return ``(A, b, c)`` of the modes, block diagonal, without the dead time.

@@ -11,7 +11,8 @@ from hybridsep.base.metrics import rms
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fitting.compensation import LookAheads, Stretch
+from hybridsep.fitting.compensation import Ahead, LookAheads, Stretch
+from hybridsep.fitting.fit import fit
 from hybridsep.fitting.replay import Recording
 from hybridsep.identify.model import machine_of
 from hybridsep.logs.units import shown_in
@@ -56,7 +57,7 @@ def test_a_look_ahead_leaves_what_a_loop_on_the_model_does(found: LookAheads) ->
     run = cosimulate(compensator, StageDrive(SERVO, f=0.0, kappa=0.0, T_s=T_S), MOVES)
     left = {one.preview: one.left for one in found.tried}
     # of 0.2 % that plans beyond the preview leave; windows begin at other samples of the moves in the loop
-    assert left[100] == pytest.approx(rms(run.error), rel=0.05)
+    assert left[100] == pytest.approx(rms(run.error), rel=0.1)
     assert left[100] < 0.01 * found.off
     assert left[25] > 0.2 * found.off
     assert left[400] < 0.02 * found.off
@@ -76,6 +77,40 @@ def test_a_look_ahead_that_is_too_short_is_said_with_the_gain_of_a_longer_one(fo
     assert f"plans leave {here.left / found.off:.2g} × the error without compensation" in line
     assert f"{there.left / found.off:.2g} ×. If the controller has it: --look-ahead {there.preview}ms." in line
     assert replace(found, chosen=there.preview).lines() == []
+
+
+@pytest.mark.parametrize(
+    ("left", "chosen", "shortest"),
+    [
+        ({50: 0.0, 200: 0.005, 400: 0.008, 900: 0.001}, 900, 200),  # below a hundredth all are alike
+        ({200: 0.2, 400: 0.1, 900: 0.1}, 900, 400),
+        ({200: 0.102, 400: 0.1, 900: 0.1}, 900, 200),
+        ({200: 0.1, 390: 0.1}, 390, 390),  # more than half of it
+        ({200: 0.1, 400: 0.1, 900: 0.0}, 400, 200),
+    ],
+)
+def test_the_shortest_look_ahead_that_leaves_as_little(left: dict[int, float], chosen: int, shortest: int) -> None:
+    tried = tuple(Ahead(preview, share, {}) for preview, share in left.items())
+    assert LookAheads(tried, chosen, 1.0, 1.0, T_S).shortest(200) == shortest
+
+
+@pytest.mark.slow
+def test_fit_takes_the_shortest_that_leaves_as_little_and_plans_go_on_behind_it() -> None:
+    slow = ModalModel([Mode(2.0, 0.9, (4 * np.pi) ** 2)])
+    moves = rest_to_rest(
+        [0.0, 0.02, -0.01, 0.0], Limits(0.1, 1.0, 20.0), T_S, start_times=[0.3, 2.0, 4.0], duration=6.0
+    )
+    x = slow.discretise(T_S).forced_response(slow.discretise(T_S).rest(), moves)[0]
+    x += 1e-6 * np.random.default_rng(4).standard_normal(len(x))
+    found = fit(moves, x, T_s=T_S, v_max=0.3, a_max=5.0, j_max=300.0)
+    settings, needed = found.machine.compensator_settings, found.machine.look_ahead
+    assert needed > 600
+    assert (settings.preview, settings.horizon) == (200, needed)
+    assert found.machine.compensator_predictor.Np < 40
+    assert found.tracking is not None
+    assert found.tracking.look_aheads is not None
+    assert found.tracking.look_aheads.chosen == 200
+    assert found.tracking.hybrid.rms < 0.02 * found.tracking.none.rms
 
 
 def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
