@@ -226,9 +226,8 @@ class SepCompensator:
         self._pending = None
 
     def _bounds(self, settings: CompensatorSettings) -> DriveBounds:
-        no_reversal = settings.no_reversal and not self.predictor.settings.averaging
         return DriveBounds(
-            self._basis, self.predictor.T_s, settings.limits, settings.change_max, no_reversal=no_reversal
+            self._basis, self.predictor.T_s, settings.limits, settings.change_max, no_reversal=settings.no_reversal
         )
 
     def _stop_within(self, bounds: DriveBounds) -> Stop | None:

@@ -154,10 +154,10 @@ class Planning(ABC):
         """Return the coefficients where no model may plan: of :meth:`ending` at first, then of its remainder."""
         return preview.previous_plan if preview.state_before is SepState.OFF else self.ending(preview)
 
-    def limits(self, preview: Preview, *, change: float = 1.0) -> Bounds:
+    def limits(self, preview: Preview, *, may_turn: bool = False, change: float = 1.0) -> Bounds:
         """Return the drive's limits on the coefficients of a plan, and a share of the largest change."""
         before = preview.x_d_before, preview.delta_before, preview.previous_plan
-        return self.bounds.bounds(preview.command, *before, change=change)
+        return self.bounds.bounds(preview.command, *before, may_turn=may_turn, change=change)
 
 
 def _after(decided: Array, free: Array | None) -> Array | None:
@@ -298,7 +298,8 @@ class AveragedPlanning(Planning):
         follows = has_learned and most is SepState.HYBRID and not self.paused
         tolerance = TOLERANCE._replace(steps=PHYSICS_STEPS) if follows else TOLERANCE
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
-        physics = self.affine_plan(g, free, path, preview, self.limits(preview, change=of_physics_change), tolerance)
+        bounds = self.limits(preview, may_turn=most is SepState.PHYSICS, change=of_physics_change)
+        physics = self.affine_plan(g, free, path, preview, bounds, tolerance)
         if physics is None:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         if not has_learned:
@@ -312,7 +313,7 @@ class AveragedPlanning(Planning):
             last = planner.point(self.ending(preview)) if ends else planner.previous(previous_plan)
             of_physics, is_away = planner.point(physics), False
             if follows:
-                bounds = self.limits(preview, change=change)
+                bounds = self.limits(preview, may_turn=True, change=change)
                 n_followed = self.n_pinned * self.spacing
                 hybrid = planner.plan(last, previous_plan, bounds, n_followed, self.basis.filtered(g))
                 if is_better(hybrid.cost, of_physics.cost):

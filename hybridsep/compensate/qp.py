@@ -225,6 +225,7 @@ class DriveBounds:
         delta_before: Array,
         previous_plan: Array,
         *,
+        may_turn: bool = False,
         change: float = 1.0,
     ) -> Bounds:
         """Return the bounds on the free coefficients of a plan.
@@ -232,9 +233,11 @@ class DriveBounds:
         ``x_d``: (preview,), m: commanded positions. Within the length of a spline of where they exceed a limit, it is
         widened by what they take of it; ``x_d_before``, ``delta_before``: (3,), m: last three commanded positions
         before the plan, and last three changes of them; ``previous_plan``: (3 + n_free,), m: coefficients of the
-        remainder of the last plan, the decided ones first; ``change``: share of ``change_max`` that bounds ``|δ|``.
+        remainder of the last plan, the decided ones first; ``may_turn``: whether the command may turn where
+        ``no_reversal`` forbids it; ``change``: share of ``change_max`` that
+        bounds ``|δ|``.
         """
-        low, high = self.hard(x_d, x_d_before, delta_before, may_turn=False, change=change)
+        low, high = self.hard(x_d, x_d_before, delta_before, may_turn=may_turn, change=change)
         taken = self._all[:, :N_DECIDED] @ previous_plan[:N_DECIDED]
         at_rest = self._free @ previous_plan[N_DECIDED:]
         low, high = np.minimum(low - taken, at_rest - _INTERIOR), np.maximum(high - taken, at_rest + _INTERIOR)

@@ -203,20 +203,26 @@ class LookAheads:
             return None
         return next(one for size, one in sizes if (1.0 - _GAIN) * size <= best)
 
-    def shortest(self, least: int) -> int:
-        """Return the shortest of at least so many samples that leaves as little as the machine's, if it is half of it.
-
-        Windows follow from it, and what is measured is older in longer ones.
-        """
+    @property
+    def shortest(self) -> int:
+        """Shortest of those for which plans are made that leaves as little as the machine's, if it is half of it."""
+        least = least_look_ahead(self.T_s)
         now = next(one.left for one in self.tried if one.preview == self.chosen)
         most = max(now, _LITTLE * self.off) / (1.0 - _GAIN)
-        found = next(one.preview for one in self.tried if one.preview >= least and one.left <= most)
+        found = next((one.preview for one in self.tried if one.preview >= least and one.left <= most), self.chosen)
         return found if 2 * found <= self.chosen else self.chosen
 
     def lines(self) -> list[str]:
-        """Return the look-ahead that is advised, and its gain, in words; empty where the machine's gains as much."""
+        """Return the look-ahead that is advised, and why, in words; empty where the machine's is as good as any."""
         now = next(one for one in self.tried if one.preview == self.chosen)
-        if (longer := self.longer(now)) is None:
+        longer = self.longer(now)
+        if longer is None and (shortest := self.shortest) < self.chosen:
+            return [
+                f"Where the model is right, plans leave as little with --look-ahead {1e3 * shortest * self.T_s:.4g}ms: "
+                "the command is needed later, and in shorter windows plans follow younger measurements, with more "
+                "work in a sample."
+            ]
+        if longer is None:
             return []
         here, there = (f"{1e3 * one.preview * self.T_s:.4g}" for one in (now, longer))
         return [
@@ -307,24 +313,10 @@ def _words(error: ErrorSize, shown: DisplayUnits) -> str:
     return f"{shown.words(error.rms, '.4g')} (largest {shown.words(error.largest, '.4g')})"
 
 
-def to_shorten(machine: Machine, recordings: Sequence[Recording]) -> LookAheads | None:
-    """Return look-aheads tried, of which a shorter one than the machine's may do; None where there is none to try."""
-    if machine.drive_limits is None or machine.look_ahead < 2 * least_look_ahead(machine.T_s):
-        return None
-    stretch = Stretch.of(machine, recordings)
-    return None if stretch is None else stretch.look_aheads()
-
-
 def expected_tracking(
-    machine: Machine,
-    recordings: Sequence[Recording],
-    tried: LookAheads | None,
-    progress: Callable[[float], object],
+    machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
 ) -> Tracking:
-    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost.
-
-    ``tried``: of :func:`to_shorten`, if the machine has one of its look-aheads.
-    """
+    """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost."""
     most = min(_TRIED_MAX, _WINDOWS_MAX * machine.compensator_predictor.Np)
     allowed, first = machine.compensator_settings, beginnings(recordings, most)
     settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
@@ -337,10 +329,7 @@ def expected_tracking(
     }
     stretch = Stretch.of(machine, recordings)
     costs = stretch.limit_costs() if stretch and bound.get("hybrid") else None
-    if tried and any(one.preview == allowed.preview for one in tried.tried):
-        ahead: LookAheads | None = replace(tried, chosen=allowed.preview or tried.chosen)
-    else:
-        ahead = stretch.look_aheads() if stretch else None
+    ahead = stretch.look_aheads() if stretch else None
     progress(1.0)
     without = max((one.without for one in judged.values()), key=len)
     none, physics, hybrid = map(ErrorSize.of, (without, *(one.compensated for one in judged.values())))

@@ -28,21 +28,13 @@ from ..logs.controller import controller_of
 from ..logs.log import Log, Table, read_log
 from ..logs.units import si_factor
 from ..machines.machine import Machine, checked_name, machine_text
-from ..model.physics import ModalModel, least_look_ahead
+from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
 from .advice import Judged, advice_on, settling_words
 from .build import fit_files, sha256_of, write_commands
 from .choice import Tried, choose_settings, period_finding, settings_to_try, with_window
-from .compensation import (
-    LIMITS_WORDS,
-    Tracking,
-    drive_limits,
-    estimated_limits,
-    expected_tracking,
-    taught,
-    to_shorten,
-)
+from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking, taught
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
 from .report import (
@@ -284,8 +276,8 @@ def fit(
     p : sequence of int
         Numbers of lags to choose from; some shares of ``Np`` if left out, none longer than a compensator's window.
     look_ahead : float, optional
-        That the controller has for a compensator, s; if left out the shortest with which plans on the model leave as
-        little as with what it needs (:meth:`~hybridsep.model.physics.ModalModel.look_ahead`).
+        That the controller has for a compensator, s; what the model needs if left out
+        (:meth:`~hybridsep.model.physics.ModalModel.look_ahead`).
     cascade : mapping, optional
         Gains of the loop, by the names of :class:`~hybridsep.base.settings.Cascade`: the physics model is theirs, and
         what the log says of them is among the findings of the identification.
@@ -351,15 +343,8 @@ def fit(
     if period := period_finding(model, recordings, default, shown):
         found = replace(found, findings=(*found.findings, period))
     tried = beginnings(recordings, _TRIED_MAX)
-    limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
-    if given_limits:
-        limits.pop("estimated", None)
-    needed, aheads = model.look_ahead(T_s, default.input_hold), None
-    if ahead is None:
-        progress("choose the look-ahead of plans", 0.39)
-        first = replace(default, p=1, q=0)
-        aheads = to_shorten(_machine(name, logs, model, first, needed, {}, limits, required=False), recordings)
-        ahead = needed if aheads is None else aheads.shortest(least_look_ahead(T_s))
+    needed = model.look_ahead(T_s, default.input_hold)
+    ahead = needed if ahead is None else ahead
     # A compensator has shorter windows, and what the predictor has learned is to serve it, too
     most = CompensatorSettings(preview=ahead).window(needed)
     if look_ahead is not None and p and max(p) > most:
@@ -374,10 +359,13 @@ def fit(
     replayed = replace(replayed, offset=found.offset).with_peers(stage("peers on the second half", 0.8, 0.9))
     progress("a plant to try with", 0.9)
     plant = identified_plant(model, settings, recordings, tried)
+    limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
+    if given_limits:
+        limits.pop("estimated", None)
     machine = _machine(name, logs, model, settings, ahead, plant.entries, limits, required=bool(given_limits))
     tracking = None
     if given_limits:
-        tracking = expected_tracking(machine, recordings, aheads, stage("tracking error with compensation", 0.95, 1.0))
+        tracking = expected_tracking(machine, recordings, stage("tracking error with compensation", 0.95, 1.0))
         predictor = taught(machine, recordings)
     judged = Judged(
         *(replayed, T_s, shown, "the log's second half"),

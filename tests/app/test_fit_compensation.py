@@ -124,7 +124,7 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
     x = simulate(stage(), x_d, T_S)
     change_max = 0.3 * float(np.abs(x_d - x).max())
     machine = axis({"velocity": 0.3, "acceleration": 30.0, "jerk": 2e4, "change_max": change_max})
-    found = expected_tracking(machine, [Recording(x_d, x, 500)], None, lambda _: None)
+    found = expected_tracking(machine, [Recording(x_d, x, 500)], lambda _: None)
     found = replace(
         found, largest=1.5 * change_max, motion={"v_max": (0.5, 0.3), "a_max": (30.0, 30.0), "j_max": (2.5e4, 2e4)}
     )

@@ -146,7 +146,7 @@ def test_slopes_of_disturbances_of_the_user_are_followed() -> None:
 
 
 def test_without_anything_learned_the_physics_model_plans() -> None:
-    x_d, none = np.concatenate((np.zeros(20), moves()[50:230])), compensator()
+    x_d, none = np.concatenate((np.zeros(20), moves()[50:230])), compensator(no_reversal=False)
     plans = [sep.plan(x_d) for sep in (none, compensator(compensate="physics"))]
     assert plans[0].state is SepState.PHYSICS
     np.testing.assert_array_equal(plans[0].x_dm, plans[1].x_dm)

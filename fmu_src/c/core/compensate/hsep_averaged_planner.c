@@ -133,6 +133,9 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *weight = hsep_at(self, self->weight);
     hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
     hsep_planner_open(task->planner, task->x_d);
+    if (self->is_physics) {
+        hsep_planner_may_turn(task->planner);
+    }
     hsep_planner_change(task->planner);
     for (hsep_int k = 0; k < self->preview; k++) {
         target[k] = weight[k] * weight[k] * (task->x_d[k] - task->predictor->start - x_pb[self->preview - 1 - k]);
@@ -549,6 +552,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         if (self->follows) {
             averaged_planner_copy(self, hsep_at(self, self->best), rest);
             memset(hsep_at(self, self->change), 0, (size_t)self->m * sizeof(hsep_real));
+            hsep_planner_may_turn(planner); /* the model follows the friction */
             planner->change = self->bound;
         }
         self->gains = self->follows;
@@ -646,6 +650,7 @@ HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hse
         hsep_at(self, self->e_h), self->samples);
     const hsep_int was_planned = self->planned;
     self->planned = best > 0;
+    self->is_physics = best == 1;
     self->judges = self->planned && (hsep_real)predictor->k >= predictor->n_init && task->model->predicted[HSEP_STATIC];
     self->follows = self->judges && best > 1 && self->paused == 0;
     self->ends = (best == 0 && was_planned > 0) || (self->judges && best > 1 && self->paused > 0);

@@ -33,6 +33,7 @@ typedef struct {
     hsep_int late;          /* samples before the window that are not measured yet: they are predicted, too */
     hsep_int n, m;          /* splines of a plan, and those that it is solved for */
     hsep_int place;         /* yield behind which the plan goes on; 0: at its beginning */
+    hsep_int is_physics;    /* whether no better model than the physics model is allowed */
     hsep_int judges;        /* whether the averaged model judges plans, */
     hsep_int follows;       /* and whether it may plan */
     hsep_int ends;          /* whether a plan that ends compensation stands for the remainder of the last one */
@@ -72,7 +73,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 42);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 43);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {

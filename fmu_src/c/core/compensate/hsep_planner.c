@@ -250,6 +250,11 @@ static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows
     hsep_splines_rows(hsep_planner_splines(self), c, planner_first(self), rows);
 }
 
+HSEP_API void hsep_planner_may_turn(hsep_planner *self)
+{
+    memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(hsep_real));
+}
+
 HSEP_API void hsep_planner_change(hsep_planner *self)
 {
     const hsep_int all = HSEP_N_DECIDED + hsep_planner_splines(self)->n;

@@ -96,6 +96,9 @@ static inline hsep_int hsep_planner_pinned(const hsep_planner *self)
 /* Begin plans of a window. x_d: commanded positions, m, (preview,). */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
 
+/* Let plans of this window turn where no_reversal forbids it. */
+HSEP_API void hsep_planner_may_turn(hsep_planner *self);
+
 /* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the
  * model, (preview,); target: x_d minus the model's response to x_d plus the decided part of delta, m, (preview,). Cost:
  * n preview multiply-adds. */

@@ -127,7 +127,7 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
         .limit =
             {settings->change_max, settings->v_max * T_s, settings->a_max * (T_s * T_s),
              settings->j_max * (T_s * T_s * T_s)},
-        .no_reversal = settings->no_reversal && !parameters->averaging.averaging,
+        .no_reversal = settings->no_reversal != 0,
         .pinned = parameters->averaging.averaging ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER,
         .window = parameters->averaging.averaging && horizon == settings->preview ? Np / settings->spacing : 0};
     derived.compensate = (hsep_sep_state)settings->compensate;
