@@ -49,12 +49,19 @@ class SepCompensator:
 
     Where its :attr:`monitor` has tripped, or lost the measurement, no model plans, and the change of the command fades.
 
-    The ``predictor``, at the beginning of a run, learns from the modified commands. With ``averaging`` plans follow the
-    slope of its model (:mod:`~hybridsep.compensate.newton`); else they use the paper's. ``settings`` are the defaults
-    if left out.
+    Parameters
+    ----------
+    predictor : HybridPredictor
+        At the beginning of a run; it learns from the modified commands. With ``averaging`` plans follow the slope of
+        its model (:mod:`~hybridsep.compensate.newton`); else they use the paper's.
+    settings : CompensatorSettings, optional
+        The defaults if left out.
 
-    ParameterError if ``preview`` or ``spacing`` does not fit the predictor's ``Np``, or the predictor has a
-    ``measurement_delay`` without averaging.
+    Raises
+    ------
+    ParameterError
+        If ``preview`` or ``spacing`` does not fit the predictor's ``Np``, or the predictor has a ``measurement_delay``
+        without averaging.
     """
 
     _SAVED = ("lead_in", "_state_before", "monitor", "_previous_plan", "_last_stop", "_delta_before", "_x_d_before")

@@ -87,16 +87,25 @@ def backtest(
 ) -> Backtest:
     """Replay a log.
 
-    The predictor goes on from its present state, and learns the log on the way; call its ``restart`` before for another
-    run with the weights kept.
+    The predictor goes on from its present state; call its ``restart`` before for another run with the weights kept.
 
-    ``x_d``, ``x_meas``, (n,), m: commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it
-    is missing. Or a :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments, or a table that is read
-    as one. ``starts``: first samples of the segments, which gaps separate: another run begins with each, and what was
-    learned is kept. ``progress`` is called with the fraction done after each window.
+    Parameters
+    ----------
+    predictor : HybridPredictor
+        It learns the log on the way.
+    x_d, x_meas : (n,) array_like, m
+        Commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it is missing. Or a
+        :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments, or a table that is read as one.
+    starts : sequence of int
+        First samples of the segments, which gaps separate: another run begins with each, and what was learned is kept.
+    progress : callable, optional
+        Called with the fraction done after each window.
 
-    SignalError if the samples are empty, of different lengths or not finite, the predictor is unchanged then; or if the
-    prediction diverges.
+    Raises
+    ------
+    SignalError
+        If the samples are empty, of different lengths or not finite; the predictor is unchanged then. If the prediction
+        diverges.
     """
     if is_table(x_d):
         x_d = read_log(cast("Table", x_d), T_s=predictor.T_s)

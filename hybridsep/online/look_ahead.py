@@ -156,9 +156,18 @@ _KIND = "look-ahead"
 class LookAhead:
     """Delay line of commands, with the position predicted ahead, and the commands modified by a planner.
 
-    The ``model`` is restarted here: what it has learned is kept. ``start``, m: where the drive is at rest; ``t_init``,
-    s: warm-up after the first fill, the predictor's own if left out, 0 for a warm start; ``unit``, m or rad: of
-    positions, which may be larger of a rotary axis. SignalError if ``start`` is not finite.
+    SignalError if its ``start`` is not finite.
+
+    Parameters
+    ----------
+    model : HybridPredictor or Planner
+        Restarted here: what it has learned is kept.
+    start : float
+        Position where the drive is at rest, m.
+    t_init : float, optional
+        Warm-up after the first fill, s; the predictor's own if left out, 0 for a warm start.
+    unit : {"m", "rad"}
+        Of positions: those of a rotary axis may be larger.
 
     Attributes
     ----------

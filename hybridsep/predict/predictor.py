@@ -53,12 +53,19 @@ class HybridPredictor:
     :meth:`predict` does not change the weights. Memory and cost per window are constant. With a ``measurement_delay``
     what arrives over a window was measured so many samples earlier; what is not measured yet is predicted anew.
 
-    ``model`` is ``G_pb``, eq. (15); ``settings`` are the defaults if left out. ``start``, m: initial position at rest,
-    the first command if left out; positions are relative to it internally, because ridge regression is not invariant to
-    an offset. ``disturbances``, with averaging: more candidates, functions ``d(x, v)`` of positions, m, and commanded
-    velocities, m/s, ``(n,)`` each, in any unit; what they are worth is learned. A compensator follows their slopes,
-    taken over the motion of a sample. They are not part of a saved state, or of an FMU. ParameterError if they are
-    given without averaging, or are not functions.
+    Parameters
+    ----------
+    model : ModalModel
+        ``G_pb``, eq. (15).
+    settings : PredictorSettings, optional
+        The defaults if left out.
+    start : float, optional
+        Initial position, m, at rest; the first command if left out. Positions are relative to it internally, because
+        ridge regression is not invariant to an offset.
+    disturbances : sequence of Disturbance, optional
+        With averaging: more candidate disturbances, functions ``d(x, v)`` of positions, m, and commanded velocities,
+        m/s, ``(n,)`` each, in any unit; what they are worth is learned. A compensator follows their slopes, taken over
+        the motion of a sample. They are not part of a saved state, or of an FMU.
 
     Attributes
     ----------
@@ -67,6 +74,11 @@ class HybridPredictor:
     state : PredictorState
     pending : PredictedWindow, optional
         The predicted window, until it is measured.
+
+    Raises
+    ------
+    ParameterError
+        If disturbances are given without averaging, or are not functions.
     """
 
     def __init__(
