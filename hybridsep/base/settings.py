@@ -261,8 +261,8 @@ class CompensatorSettings(Settings):
     What is left out is in the drive's time: ``preview`` is what its model needs to follow
     (:meth:`~hybridsep.model.physics.ModalModel.look_ahead`), ``spacing`` a hundredth of it, or the next smaller divisor
     of ``Np``. The differences of ``x_dm`` keep the drive's ``limits``, if there are any; where those of ``x_d`` do not,
-    by what these take more. ``no_reversal`` has no effect without them, nor with ``averaging`` where the averaged model
-    plans, or ``compensate = physics``. ``change_max``, None for no bound, is about twice the servo error
+    by what these take more. ``no_reversal`` has no effect without them; with ``averaging`` it bounds the physics
+    model's plan in the hybrid's stead alone. ``change_max``, None for no bound, is about twice the servo error
     without compensation: hybrid plans that ask for far more pause
     (:func:`~hybridsep.compensate.planning.runs_away`); ``following_error_max`` about 1.3 times the largest one
     (:class:`~hybridsep.online.look_ahead.Monitor`). With ``averaging`` a hybrid plan of motion more than 1.25 times as
@@ -294,7 +294,7 @@ class CompensatorSettings(Settings):
         nonzero=1e-12,
         tunable=True,
     )
-    no_reversal: bool = flag(True, "whether the modified command, without averaging, never turns while x_d moves")
+    no_reversal: bool = flag(True, "whether plans of a linear model keep x_dm from turning while x_d moves")
     compensate: str = choice(
         "hybrid",
         {

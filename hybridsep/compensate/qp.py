@@ -234,8 +234,7 @@ class DriveBounds:
         widened by what they take of it; ``x_d_before``, ``delta_before``: (3,), m: last three commanded positions
         before the plan, and last three changes of them; ``previous_plan``: (3 + n_free,), m: coefficients of the
         remainder of the last plan, the decided ones first; ``may_turn``: whether the command may turn where
-        ``no_reversal`` forbids it; ``change``: share of ``change_max`` that
-        bounds ``|δ|``.
+        ``no_reversal`` forbids it; ``change``: share of ``change_max`` that bounds ``|δ|``.
         """
         low, high = self.hard(x_d, x_d_before, delta_before, may_turn=may_turn, change=change)
         taken = self._all[:, :N_DECIDED] @ previous_plan[:N_DECIDED]

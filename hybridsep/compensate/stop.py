@@ -18,14 +18,16 @@ from .qp import ROUNDING, DriveBounds
 from .splines import N_DECIDED, SplineBasis
 
 _TRIES = 12
-"""Lengths of the way from the last stop to a plan that are tried, all of it first. With 0.8 of the last one each time,
-and none where these fail, an axis with 50 ms of look-ahead stood 6 mm off: the next window asked for the same."""
+"""Lengths of the way from the last stop to a plan that are tried, all of it first, to a two-thousandth. With 0.8 of the
+last one each time, and none where eight fail, an axis with 50 ms of look-ahead stood 6 mm off: the next window asked
+for the same (``docs/experiments/2026-11-29-stops-by-bisection.md``)."""
 
 _FADE = 10.0
 """Time constants, in a horizon, with which the change fades behind a plan that has no stop."""
 
-_STILL = 1e-12
-"""Row of the last stop's own part, in limits, below which that part does not matter."""
+_STILL = 1e-6
+"""Row of the last stop's own part, in limits, below which that part does not matter: a multiple of it that makes room
+for a plan would be rounding."""
 
 
 class Stop:

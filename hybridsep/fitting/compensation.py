@@ -50,7 +50,7 @@ _CHANGED = ("acceleration", "jerk", "change_max")  # entries of ``[drive_limits]
 FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to say what it costs
 _GAIN = 0.05  # relative gain from which on a limit twice as large, or a longer look-ahead, is advised
 
-_TRIED_MAX, _WINDOWS_MAX = 10_000, 300  # leading samples, and windows, in which a compensator is tried, at most
+_TRIED_MAX = 10_000  # leading samples on which a compensator is tried
 _AHEAD = (0.025, 0.05, 0.1, 0.2, 0.4)  # look-aheads, s, that are tried beside the machine's own and the model's
 _DEMANDING = 2000  # most samples of the stretch on which limits and look-aheads are tried
 _LITTLE = 0.01  # share of the error without compensation below which errors are alike
@@ -205,11 +205,10 @@ class LookAheads:
 
     @property
     def shortest(self) -> int:
-        """Shortest of those for which plans are made that leaves as little as the machine's, if it is half of it."""
+        """Shortest that plans are made for and no longer one gains on, if it is half of the machine's or less."""
         least = least_look_ahead(self.T_s)
-        now = next(one.left for one in self.tried if one.preview == self.chosen)
-        most = max(now, _LITTLE * self.off) / (1.0 - _GAIN)
-        found = next((one.preview for one in self.tried if one.preview >= least and one.left <= most), self.chosen)
+        enough = (one.preview for one in self.tried if one.preview >= least and self.longer(one) is None)
+        found = next(enough, self.chosen)
         return found if 2 * found <= self.chosen else self.chosen
 
     def lines(self) -> list[str]:
@@ -219,8 +218,8 @@ class LookAheads:
         if longer is None and (shortest := self.shortest) < self.chosen:
             return [
                 f"Where the model is right, plans leave as little with --look-ahead {1e3 * shortest * self.T_s:.4g}ms: "
-                "the command is needed later, and in shorter windows plans follow younger measurements, with more "
-                "work in a sample."
+                "they need less of the command ahead, and follow younger measurements in shorter windows, at more work "
+                "in a sample (up to three times)."
             ]
         if longer is None:
             return []
@@ -317,8 +316,7 @@ def expected_tracking(
     machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
 ) -> Tracking:
     """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost."""
-    most = min(_TRIED_MAX, _WINDOWS_MAX * machine.compensator_predictor.Np)
-    allowed, first = machine.compensator_settings, beginnings(recordings, most)
+    allowed, first = machine.compensator_settings, beginnings(recordings, _TRIED_MAX)
     settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
     judged = {model: _expected(machine, one, first) for model, one in settings.items()}
     progress(0.8)

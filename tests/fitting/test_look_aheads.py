@@ -85,12 +85,14 @@ def test_a_look_ahead_that_is_too_short_is_said_with_the_gain_of_a_longer_one(fo
         ({200: 0.2, 400: 0.1, 900: 0.1}, 900, 400),
         ({200: 0.102, 400: 0.1, 900: 0.1}, 900, 200),
         ({200: 0.1, 390: 0.1}, 390, 390),  # more than half of it
-        ({200: 0.1, 400: 0.1, 900: 0.0}, 400, 200),
+        ({200: 0.15, 400: 0.05, 960: 0.15}, 960, 400),  # as none of them is to be too short
     ],
 )
 def test_the_shortest_look_ahead_that_leaves_as_little(left: dict[int, float], chosen: int, shortest: int) -> None:
     tried = tuple(Ahead(preview, share, {}) for preview, share in left.items())
-    assert LookAheads(tried, chosen, 1.0, 1.0, T_S).shortest == shortest
+    found = LookAheads(tried, chosen, 1.0, 1.0, T_S)
+    assert found.shortest == shortest
+    assert replace(found, chosen=shortest).lines() == []
 
 
 def test_a_shorter_look_ahead_that_leaves_as_little_is_advised_and_does() -> None:
@@ -103,7 +105,7 @@ def test_a_shorter_look_ahead_that_leaves_as_little_is_advised_and_does() -> Non
     (line,) = long.lines()
     assert "--look-ahead 200ms" in line
     assert short.lines() == []
-    assert all(one.left < 0.01 * one_of.off for one_of in (long, short) for one in one_of.tried if one.preview >= 200)
+    assert all(one.left < 0.01 * found.off for found in (long, short) for one in found.tried if one.preview >= 200)
 
 
 def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:

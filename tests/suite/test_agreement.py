@@ -194,8 +194,12 @@ def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, 
     delay = int(values.get("measurement_delay", 0))
     n = 200 if values.get("Np") in (1, 2) else 650 if "averaging" in values else 500
     start = 0.1 if delay and "spacing" in values else 0.0
-    tolerance = 1e-7 if {"horizon", "j_max"} <= values.keys() else 1e-9  # rounding may decide how far a plan goes
-    assert_agreement(new_stream, n, values, tolerance, start=start, delay=delay)
+    assert_agreement(new_stream, n, values, 1e-9, start=start, delay=delay)
+
+
+@on_all((COMPENSATOR,), needs="agreement")
+def test_the_physics_models_plans_turn_as_in_the_library(new_stream: StreamMaker) -> None:
+    assert_agreement(new_stream, 500, {"compensate": 1, "spacing": 5}, 1e-9, path="spiral")
 
 
 def at_rest_first(k: int, x_meas: float, last: float) -> float:

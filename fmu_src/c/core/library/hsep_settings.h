@@ -61,7 +61,7 @@
     SETTING(compensator, hsep_real, change_max, 0.001, 1e-12, 10.0, 0.0, 1e-12, 0) \
     /* following error above which, for three samples in a row, the command's change fades until reset; 0: none, m */ \
     SETTING(compensator, hsep_real, following_error_max, 0.0, 0.0, 10.0, 1e-12, 0.0, 0) \
-    /* whether the modified command, without averaging, never turns while x_d moves */ \
+    /* whether plans of a linear model keep x_dm from turning while x_d moves */ \
     SETTING(compensator, hsep_int, no_reversal, 1.0, 0.0, 1.0, 0.0, 0.0, 0) \
     /* best model to compensate with: 0 off, 1 physics, 2 hybrid */ \
     SETTING(compensator, hsep_int, compensate, 2.0, 0.0, 2.0, 0.0, 0.0, 0) \
