@@ -17,8 +17,9 @@ from streams import StreamMaker, on_adapters, on_all
 
 TOLERANCE = 1e-9  # of a plan, m: 1 nm
 
-N_RUN = 440
+N_RUN = 500
 CHANGES = {129: ("compensate", 0), 248: ("compensate", 2), 311: ("change_max", 5e-6), 395: ("change_max", 1e-3)}
+CHANGES[427] = ("compensate", 1)
 """What is set before which sample; windows begin at multiples of 20."""
 
 LIMITS = {"v_max": 0.5, "a_max": 30.0, "j_max": 3000.0}
@@ -80,6 +81,7 @@ def test_changes_act_from_the_next_window_on_and_fade(new_stream: StreamMaker, a
     assert np.max(delta[270:319]) > 2e-5
     assert np.max(delta[359:399]) <= 5e-6 * (1 + 1e-6)
     assert np.max(delta[410:]) > 1e-5
+    assert np.max(state[459:]) == 1.0  # physics at best
     assert_limits(x_dm)
 
 
