@@ -25,9 +25,9 @@ for the same (``docs/experiments/2026-11-29-stops-by-bisection.md``)."""
 _FADE = 10.0
 """Time constants, in a horizon, with which the change fades behind a plan that has no stop."""
 
-_STILL = 1e-6
-"""Row of the last stop's own part, in limits, below which that part does not matter: a multiple of it that makes room
-for a plan would be rounding."""
+_STILL, _NOTHING = 1e-12, 1e-6
+"""Row of the last stop's own part, in limits, below which that part does not matter there; and largest row up to which
+it counts nowhere: a multiple of it that makes room for a plan would be rounding."""
 
 
 class Stop:
@@ -61,6 +61,8 @@ class Stop:
         of_old, own = self.rows @ old, self.rows @ (old - self._stopping @ old[:n])
         low, high = np.minimum(low, of_old) - ROUNDING, np.maximum(high, of_old) + ROUNDING
         start, way = of_old - own, self.rows @ now - (of_old - own)
+        if np.max(np.abs(own), initial=0.0) <= _NOTHING:
+            own = np.zeros_like(own)
         # Lengths and shares that keep all bounds are a convex set with the last stop in it: the longest by bisection
         length, share, too_long, tried = 0.0, 1.0, 1.0, 1.0
         for _ in range(_TRIES):

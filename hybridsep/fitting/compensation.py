@@ -214,15 +214,14 @@ class LookAheads:
     def lines(self) -> list[str]:
         """Return the look-ahead that is advised, and why, in words; empty where the machine's is as good as any."""
         now = next(one for one in self.tried if one.preview == self.chosen)
-        longer = self.longer(now)
-        if longer is None and (shortest := self.shortest) < self.chosen:
+        if (longer := self.longer(now)) is None:
+            if (shortest := self.shortest) == self.chosen:
+                return []
             return [
                 f"Where the model is right, plans leave as little with --look-ahead {1e3 * shortest * self.T_s:.4g}ms: "
                 "they need less of the command ahead, and follow younger measurements in shorter windows, at more work "
                 "in a sample (up to three times)."
             ]
-        if longer is None:
-            return []
         here, there = (f"{1e3 * one.preview * self.T_s:.4g}" for one in (now, longer))
         return [
             f"The look-ahead of {here} ms is too short for the drive: where the model is right, plans leave "

@@ -539,7 +539,8 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     const size_t shared = (size_t)first * sizeof(hsep_real);
     hsep_real *last = hsep_at(self, self->last), *own = hsep_at(self, self->own), *now = hsep_at(self, self->now);
     hsep_real *start = hsep_at(self, self->start), *way = hsep_at(self, self->way);
-    hsep_real *own_rows = hsep_at(self, self->own_rows), length = 0.0, share = 1.0, too_long = 1.0, tried = 1.0;
+    hsep_real *own_rows = hsep_at(self, self->own_rows), length = 0.0, share = 1.0, too_long = 1.0, tried = 1.0,
+              most = 0.0;
     memcpy(own, last, shared);
     stop_behind(self, own);
     for (hsep_int i = 0; i < self->count; i++) {
@@ -554,6 +555,10 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     for (hsep_int r = 0; r < rows; r++) {
         start[r] -= own_rows[r];
         way[r] -= start[r];
+        most = hsep_fmax(most, hsep_fabs(own_rows[r]));
+    }
+    if (most <= HSEP_STOP_NOTHING) {
+        memset(own_rows, 0, (size_t)rows * sizeof(hsep_real));
     }
     for (int tries = 0; tries < HSEP_STOP_TRIES && length < 1.0; tries++) { /* convex, with the last stop in it */
         hsep_real found = 0.0;
