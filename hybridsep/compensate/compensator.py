@@ -221,7 +221,7 @@ class SepCompensator:
         for i, error in enumerate((measured - x_d[first : first + Np]).tolist()[monitor.n_taken :], monitor.n_taken):
             if not monitor.take_in(error) and predictor.settings.averaging:
                 measured[i] = np.nan
-        predictor.update(measured, learn=predictor.k >= self.lead_in)
+        predictor.update(measured, learn=predictor.k >= self.lead_in, ahead=self._planning.due)
         self.monitor, monitor.n_taken = monitor, 0
         kept = Np // self.spacing
         self._previous_plan = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
@@ -249,7 +249,8 @@ class SepCompensator:
         return pack(_KIND, meta, arrays, {"predictor": self.predictor.to_bytes()})
 
     def _saved(self) -> tuple[Any, ...]:
-        return *(getattr(self, name) for name in self._SAVED), self._planning.paused, self._planning.pause
+        planning = self._planning
+        return *(getattr(self, name) for name in self._SAVED), planning.paused, planning.pause, planning.ahead
 
     @classmethod
     def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> "SepCompensator":
@@ -267,7 +268,8 @@ class SepCompensator:
                 compensator._previous_plan, nothing, nothing, compensator._last_stop, SepState.OFF, False
             )
             like = compensator._saved(), pending if meta["is_planned"] else ()
-            (*saved, compensator._planning.paused, compensator._planning.pause), found = restored(like, arrays)
+            planning = compensator._planning
+            (*saved, planning.paused, planning.pause, planning.ahead), found = restored(like, arrays)
             for name, value in zip(cls._SAVED, saved, strict=True):
                 setattr(compensator, name, value)
             compensator._pending = found or None

@@ -3,7 +3,8 @@
 With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. The averaged one, as
 soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan. Where its
 own plan runs away, it plans none for a time, and one that ends compensation is judged in place of the remainder; that
-is followed, too, where compensation is switched off, or has tripped. A motion faster than all of its run is compensated
+is followed, too, where compensation is switched off, or has tripped. It weighs its experts by their errors in the
+window and half a plan ahead, so that the expert of the next 20 ms alone does not plan what comes behind them. A motion faster than all of its run is compensated
 with at most half of the largest change.
 """
 
@@ -18,6 +19,7 @@ from scipy.signal import lfilter
 from ..base.settings import CompensatorSettings
 from ..base.signals import Array, as_published
 from ..online.look_ahead import SepState
+from ..predict.averaging.experts import EXPERTS
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
@@ -82,6 +84,9 @@ class Planning(ABC):
     SOLVED: ClassVar[Tolerance]  # to which programmes are solved
     paused: int  # windows that the residual model does not plan now
     pause: int  # and after its next plan that runs away
+    # (m, n_experts, Np), m: what the last plans stacked half their length ahead, NaN where nothing; first for this
+    # window, last by its own plan; none with the paper's model
+    ahead: Array
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         self.basis, self.bounds, self.settings, self.Np = basis, bounds, settings, Np
@@ -94,13 +99,20 @@ class Planning(ABC):
     def restart(self, T_s: float) -> None:
         """Begin another run, with a sampling interval in s: nothing is paused."""
         self.paused, self.pause = 0, max(1, int(RETRY / (self.Np * T_s) + 0.5))  # rounded as in C
+        self.ahead = np.empty((0, 0, self.Np))
 
     def follow(self, *, runs_away: bool) -> None:
         """Count a window that followed its plan."""
+        self.ahead = np.concatenate((self.ahead[1:], np.full_like(self.ahead[:1], np.nan)))
         if runs_away:
             self.paused, self.pause = self.pause, 2 * self.pause
         else:
             self.paused = max(0, self.paused - 1)
+
+    @property
+    def due(self) -> Array | None:
+        """What the residual model's plan of half its length ago stacked for this window, ``(n_experts, Np)``, m."""
+        return self.ahead[0] if len(self.ahead) else None
 
     @abstractmethod
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
@@ -279,6 +291,11 @@ class AveragedPlanning(Planning):
         free = solved_splines(n, Np // self.spacing if self.horizon == settings.preview else n)
         self.splines = np.concatenate((np.zeros((self.n_pinned, free.shape[1])), free))
 
+    def restart(self, T_s: float) -> None:
+        """Begin another run: nothing is paused, and nothing was planned."""
+        super().restart(T_s)
+        self.ahead = np.full((max(1, self.horizon // (2 * self.Np)), len(EXPERTS), self.Np), np.nan)
+
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the allowed plan that the averaged model judges best; before it has learned, the physics model's."""
         averaged, state, previous_plan = predictor.residual, predictor.state, preview.previous_plan
@@ -287,7 +304,7 @@ class AveragedPlanning(Planning):
         path = preview.command - predictor.start
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
             x_d = path + self.basis.delta(previous_plan)
-            model = PlanModel(averaged, state.physics, state.late, predictor.start, x_d, path, preview.load)
+            model = PlanModel(averaged.for_plans(), state.physics, state.late, predictor.start, x_d, path, preview.load)
         scales = model.scales  # of the remainder of the last plan
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, self.without_model(preview), scales)
@@ -300,6 +317,9 @@ class AveragedPlanning(Planning):
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
         bounds = self.limits(preview, may_turn=most is SepState.PHYSICS, change=of_physics_change)
         physics = self.affine_plan(g, free, path, preview, bounds, tolerance)
+        if has_learned:
+            end = len(self.ahead) * self.Np
+            self.ahead[-1] = model.of_previous_plan.stacked[:, end - self.Np : end]
         if physics is None:
             return ChosenPlan(SepState.OFF, previous_plan, scales)
         if not has_learned:

@@ -70,11 +70,13 @@ class PaperModel:
         """Return the model at the beginning of a run in motion: the same, a run of the paper's begins at rest."""
         return self
 
-    def learn(self, forecast: Forecast, x: Array, *, fold: bool = True) -> tuple[PaperModel, NDArray[np.bool_]]:
+    def learn(
+        self, forecast: Forecast, x: Array, *, fold: bool = True, ahead: Array | None = None
+    ) -> tuple[PaperModel, NDArray[np.bool_]]:
         """Learn from the measurement of a window; every sample is accepted.
 
         ``x``, (m,), m: measured positions of its first ``m`` samples, relative to the start; ``fold``: whether they
-        are learned; the next window starts from them in any case. Returns (m,).
+        are learned; the next window starts from them in any case; ``ahead``: none. Returns (m,).
         """
         m, Np = len(x), self.settings.Np
         measured, regression = forecast.window.x_pb[:m], self.regression

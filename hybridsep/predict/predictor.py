@@ -173,11 +173,12 @@ class HybridPredictor:
         return PredictedWindow(forecast, self.state.uncertainty.predict(x_pb, e_h, variance, self.Np))
 
     @one_blas_thread
-    def update(self, x: ArrayLike, *, learn: bool = True) -> None:
+    def update(self, x: ArrayLike, *, learn: bool = True, ahead: Array | None = None) -> None:
         """Learn from the measurement of the predicted window, or of its first samples; eq. (6).
 
         ``x``, (m,), m: measured positions that arrived, ``1 ≤ m ≤ n`` of the last :meth:`predict`; ``learn``: whether
-        they enter the regression; the next window starts from their residuals in any case.
+        they enter the regression; the next window starts from their residuals in any case; ``ahead``: from a
+        compensator with averaging, as :meth:`AveragedModel.learn` takes it.
 
         SignalError if nothing was predicted, ``x`` is longer than the window, or a value is not finite; nothing is
         changed then.
@@ -199,7 +200,7 @@ class HybridPredictor:
                 window = ResidualWindow(x_d + before.x_d, x_pb + before.x_pb, start, path)
                 physics, e_pb = physics + before.state, e_pb - before.x_pb[:m]
                 forecast, residual = replace(forecast, window=window), residual.begin_in_motion(window, forecast.scales)
-        residual, accepted = residual.learn(forecast, measured - start, fold=learn)
+        residual, accepted = residual.learn(forecast, measured - start, fold=learn, ahead=ahead)
         uncertainty = state.uncertainty.learn(error, e_pb, accepted, self.Np) if learn else state.uncertainty
         x_d = forecast.window.x_d
         _, physics = self.discrete.forced_response(physics, x_d[:m])

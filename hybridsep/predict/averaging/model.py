@@ -83,18 +83,24 @@ class Learned:
     # pair of ResidualScale: sizes of the residuals, of the physics model and of the command
     scales: tuple[ResidualScale, ResidualScale]
     errors: tuple[ExpertErrors, ...]  # of the regressions
-    stack: Stack
+    # pair: of predictions, and of a compensator's plans, by errors half a plan ahead, too
+    stacks: tuple[Stack, ...]
     largest: Array  # (n_static,): largest magnitudes of the static features
 
     @classmethod
     def init(cls, n_static: int) -> Learned:
         """Return that nothing has been learned."""
         scales, errors = (ResidualScale(), ResidualScale()), (ExpertErrors(),) * len(REGRESSIONS)
-        return cls(0.0, 0.0, 0.0, scales, errors, Stack.init(), np.zeros(n_static))
+        return cls(0.0, 0.0, 0.0, scales, errors, (Stack.init(),) * 2, np.zeros(n_static))
 
     def errors_of(self, expert: Regression) -> ExpertErrors:
         """Return what is known of the errors of an expert."""
         return self.errors[REGRESSIONS.index(expert)]
+
+    @property
+    def stack(self) -> Stack:
+        """Stack of predictions."""
+        return self.stacks[0]
 
     def with_errors(self, changed: Mapping[Regression, ExpertErrors]) -> Learned:
         """Return the same with other errors of some experts."""
@@ -201,10 +207,11 @@ class AveragedModel:
         """Return the model at the beginning of another run, at rest; what was learned is kept, and doubted."""
         learned, most = self.learned, CONSTANTS.warm_windows_max * self.settings.Np
         evidence = self.evidence[0].begin_run(most), self.evidence[1].begin_run(most)
-        leading, stack, errors = learned.stack.leader, learned.stack.forget(FRESH_START), ExpertErrors()
+        leading, (stack, of_plans), errors = learned.stack.leader, learned.stacks, ExpertErrors()
+        stacks = [one.forget(FRESH_START) for one in (stack, of_plans if of_plans.evidence[1] else stack)]
         if evidence[MODEL_RESIDUAL].earlier.n_rows > 0.0:
-            stack, errors = stack.copy(leading, FRESH_START), learned.errors_of(leading)
-        learned = replace(learned.with_errors({FRESH_START: errors}), stack=stack)
+            stacks, errors = [one.copy(leading, FRESH_START) for one in stacks], learned.errors_of(leading)
+        learned = replace(learned.with_errors({FRESH_START: errors}), stacks=tuple(stacks))
         run = RunState.init(self.settings.p, self.static, self.command, self.run.memory.restart())
         state = replace(self, learned=learned, evidence=evidence, leader=leading.place, run=run)
         return state.with_noise(learned)
@@ -212,6 +219,10 @@ class AveragedModel:
     def plan_ahead(self) -> AveragedModel:
         """Return the model where a compensator decides the commands."""
         return replace(self, static=replace(self.static, is_planned=True))
+
+    def for_plans(self) -> AveragedModel:
+        """Return the model with the weights that plans weigh its experts by."""
+        return replace(self, learned=replace(self.learned, stacks=self.learned.stacks[1:] * 2))
 
     def take_over(self, learned: Learned, regressions: tuple[RidgeRegression, ...]) -> AveragedModel:
         """Return the model with what another one has learned."""
@@ -307,12 +318,13 @@ class AveragedModel:
         return replace(self, run=replace(self.run, static=static, commands=commands, past=past))
 
     def learn(
-        self, forecast: AveragedForecast, x: Array, *, fold: bool = True
+        self, forecast: AveragedForecast, x: Array, *, fold: bool = True, ahead: Array | None = None
     ) -> tuple[AveragedModel, NDArray[np.bool_]]:
         """Learn from the measurement of a window.
 
         ``forecast``: of this state; ``x``, (m,), m: measured positions of its first ``m`` samples, relative to the
-        start; NaN where missing; ``fold``: whether they are learned; the next window starts from them in any case.
+        start; NaN where missing; ``fold``: whether they are learned; the next window starts from them in any case;
+        ``ahead``, (n_experts, m), m: of a compensator, what a plan stacked for the window, NaN where none did.
         Returns (m,): which samples are accepted.
         """
         m, run = len(x), self.run
@@ -328,7 +340,7 @@ class AveragedModel:
         if fold:
             of_command = self.command.rows(run.commands, window.x_d)
             state = _folded(state, forecast, (rows, of_command), (e, e_0), accepted)
-            state = _judged(state, forecast, (e, e_0), accepted) if accepted.any() else state
+            state = _judged(state, forecast, (e, e_0), accepted, ahead) if accepted.any() else state
         past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
         n_rejected = run.n_rejected + m - int(accepted.sum())
         commands = np.concatenate((run.commands, window.x_d))[m:]
@@ -341,10 +353,10 @@ def _with_scales(state: AveragedModel, forecast: AveragedForecast, fastest: floa
     """Take over the scales of a window; what was learned at lower velocities is forgotten if it outgrows them."""
     learned, (velocity, largest, step) = state.learned, forecast.scales
     of_physics, of_command = state.evidence
-    stack = learned.stack
     if velocity != learned.velocity_scale:
-        of_physics, of_command, stack = of_physics.forget(), of_command.believe_earlier(), stack.forget(FRESH_START)
-    learned = Learned(velocity, step, fastest, learned.scales, learned.errors, stack, largest)
+        of_physics, of_command = of_physics.forget(), of_command.believe_earlier()
+        learned = replace(learned, stacks=tuple(one.forget(FRESH_START) for one in learned.stacks))
+    learned = replace(learned, velocity_scale=velocity, largest_step=step, fastest=fastest, largest=largest)
     return replace(state, learned=learned, evidence=(of_physics, of_command))
 
 
@@ -404,23 +416,32 @@ def _bridged(e_h: Array, measured: Array, accepted: NDArray[np.bool_]) -> Array:
 
 
 def _judged(
-    state: AveragedModel, forecast: AveragedForecast, e: tuple[Array, Array], accepted: NDArray[np.bool_]
+    state: AveragedModel,
+    forecast: AveragedForecast,
+    e: tuple[Array, Array],
+    accepted: NDArray[np.bool_],
+    ahead: Array | None,
 ) -> AveragedModel:
-    """Judge the experts and their stack by the measurement of their window."""
+    """Judge the experts and their stacks by the measurement of their window."""
     learned, settings = _judged_experts(state, forecast, e, accepted), state.settings
     n, late = len(accepted), settings.n_late
     published = accepted & (np.arange(n) >= late) if late < n else accepted
-    stack = learned.stack
     if published.any():
-        predicted = forecast.stacked[:, :n][:, published]
-        stack = stack.update(predicted, e[MODEL_RESIDUAL][published], settings.lam)
-    learned, led = replace(learned, stack=stack), state.leading.place
+        (stack, of_plans), measured, predicted = learned.stacks, e[MODEL_RESIDUAL], forecast.stacked[:, :n][:, published]
+        stack = stack.update(predicted, measured[published], settings.lam)
+        if ahead is not None:
+            known = accepted & np.isfinite(ahead).all(axis=0)
+            predicted = np.hstack((predicted, ahead[:, known]))
+            measured = np.concatenate((measured[published], measured[known]))
+            of_plans = of_plans.update(predicted, measured, settings.lam, stack.weights)
+        learned = replace(learned, stacks=(stack, of_plans))
+    stack, led = learned.stack, state.leading.place
     squares = stack.evidence[0] - 2.0 * stack.cross[led] + stack.gram[led, led]
     least = CONSTANTS.discard_error * learned.scales[MODEL_RESIDUAL].largest_square * stack.evidence[1]
     if not (state.doubts and squares > least and stack.weights[FRESH_START.place] > CONSTANTS.discard_above):
         return replace(state, learned=learned)
     # All experts go on with this run alone, and are judged anew.
     anew = {ARX_RESIDUAL: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(FRESH_START)}
-    learned = replace(learned.with_errors(anew), stack=Stack.init())
+    learned = replace(learned.with_errors(anew), stacks=(Stack.init(),) * 2)
     evidence = state.evidence[0].forget_earlier(), state.evidence[1].forget_earlier()
     return replace(state, learned=learned, evidence=evidence).with_noise(learned)

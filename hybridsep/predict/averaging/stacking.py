@@ -35,12 +35,14 @@ class Stack:
         n = len(EXPERTS)
         return cls(_first_weights(), np.zeros((n, n)), np.zeros(n), np.zeros(2))
 
-    def update(self, predicted: Array, measured: Array, least: float) -> "Stack":
+    def update(self, predicted: Array, measured: Array, least: float, like: Array | None = None) -> "Stack":
         """Return the stack with a measured window more.
 
         ``predicted``, (n_experts, n), m: predictions made before the window was measured; ``measured``, (n,), m;
-        ``least``, m²: least mean square that errors are judged by.
+        ``least``, m²: least mean square that errors are judged by; ``like``, (n_experts,): weights of another stack, in
+        place of ``π₀`` and with more weight.
         """
+        prior, kappa = (_first_weights(), CONSTANTS.kappa) if like is None else (like, CONSTANTS.kappa_of_plans)
         gamma, n = CONSTANTS.gamma, len(measured)
         gram = gamma * self.gram + predicted @ predicted.T
         cross = gamma * self.cross + predicted @ measured
@@ -48,8 +50,8 @@ class Stack:
         total, rows = evidence.tolist()
         errors = total - 2.0 * cross + np.diag(gram)
         best = max(min(float(errors.min()), total) / rows, least, _LEAST_SQUARE)
-        ridge = CONSTANTS.kappa * best * n
-        weights = simplex_minimum(gram + ridge * np.eye(len(EXPERTS)), cross + ridge * _first_weights())
+        ridge = kappa * best * n
+        weights = simplex_minimum(gram + ridge * np.eye(len(EXPERTS)), cross + ridge * prior)
         return Stack(weights, gram, cross, evidence)
 
     def others(self) -> Array:
