@@ -430,7 +430,7 @@ def _judged(
         (stack, of_plans), measured, predicted = learned.stacks, e[MODEL_RESIDUAL], forecast.stacked[:, :n][:, published]
         stack = stack.update(predicted, measured[published], settings.lam)
         if ahead is not None:
-            known = accepted & np.isfinite(ahead).all(axis=0)
+            known = accepted & np.isfinite(ahead).all()
             predicted = np.hstack((predicted, ahead[:, known]))
             measured = np.concatenate((measured[published], measured[known]))
             of_plans = of_plans.update(predicted, measured, settings.lam, stack.weights)

@@ -516,11 +516,13 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
     switch (self->place) {
     case 0:
-        /* The remainder of the last plan, with the variances of all plans */
+        /* The remainder of the last plan, with the variances of all plans; they weigh experts by a stack of their own */
+        hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), self->samples);
         if (self->judges) {
             AVERAGED_PLANNER_PREDICT(1, all, rest, 1)
             self->cost = averaged_planner_cost(self, task, rest);
         }
+        hsep_averaged_keep_ahead(task->model, self->judges > 0);
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
@@ -602,6 +604,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
         /* The window under the plan, and its variances */
         self->samples = 0;
+        hsep_averaged_weigh(task->model, HSEP_OF_PREDICTIONS, hsep_at(self, self->e_h), 0);
         AVERAGED_PLANNER_PREDICT(14, self->late + self->Np, c, 1)
         break;
     default:

@@ -75,6 +75,7 @@
 
 /* hybridsep/predict/averaging/constants.py */
 #define HSEP_AVERAGING_KAPPA 1.0
+#define HSEP_AVERAGING_KAPPA_OF_PLANS 10.0
 #define HSEP_AVERAGING_GAMMA 0.95
 #define HSEP_AVERAGING_LAGS_OF_COMMAND 36
 #define HSEP_AVERAGING_LAST_LAG 0.005

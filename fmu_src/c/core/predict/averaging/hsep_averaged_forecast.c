@@ -139,27 +139,34 @@ static void averaged_take(hsep_averaged *self, hsep_int place, const hsep_real x
     }
 }
 
-/* What is recalled for the window, and how much: where it is not alike, the other experts share its weight. last: m,
- * the last residual of the physics model. */
+/* Weights of the experts by one of the stacks: where nothing alike is recalled, the others share its weight. */
+static void averaged_weigh(hsep_averaged *self, hsep_int place)
+{
+    const hsep_stack *stack = &self->learned.stacks[place];
+    const hsep_real recalled = stack->weights[HSEP_RECALL];
+    hsep_stack_others(stack, self->others);
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
+        self->weights[i] = stack->weights[i];
+        self->shares[i] = stack->weights[i] + recalled * (1.0 - self->alike) * self->others[i];
+    }
+    self->shares[HSEP_RECALL] = recalled * self->alike;
+}
+
+/* What is recalled for the window, and how much. last: m, the last residual of the physics model. */
 static void averaged_recall(hsep_averaged *self, hsep_real last)
 {
-    const hsep_stack *stack = &self->learned.stack;
     hsep_real *recalled = hsep_at(self, self->recalled);
     self->alike = hsep_recall_forecast(hsep_averaged_recall(self), last, recalled);
     for (hsep_int j = 0; j < self->n; j++) {
         recalled[j] = hsep_clip(recalled[j], self->bound);
     }
-    hsep_stack_others(stack, self->others);
-    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
-        self->shares[i] = stack->weights[i] + stack->weights[HSEP_RECALL] * (1.0 - self->alike) * self->others[i];
-    }
-    self->shares[HSEP_RECALL] = stack->weights[HSEP_RECALL] * self->alike;
+    averaged_weigh(self, HSEP_OF_PREDICTIONS);
 }
 
 /* e: the stack of the experts, which have predicted the places begin ... end - 1. */
 static void averaged_stack(hsep_averaged *self, hsep_real e[], hsep_int begin, hsep_int end)
 {
-    const hsep_real *weights = self->learned.stack.weights, *recalled = hsep_at(self, self->recalled);
+    const hsep_real *weights = self->weights, *recalled = hsep_at(self, self->recalled);
     hsep_real *stacked = hsep_at(self, self->stacked);
     hsep_real *variance = hsep_at(self, self->variance);
     for (hsep_int j = begin; j < end; j++) {
@@ -210,6 +217,26 @@ HSEP_API void hsep_averaged_go_on(
     }
     averaged_hold(self, e[self->n], begin, end);
     averaged_stack(self, e, begin, end);
+}
+
+HSEP_API void hsep_averaged_weigh(hsep_averaged *self, hsep_int stack, hsep_real e[], hsep_int last)
+{
+    averaged_weigh(self, stack);
+    averaged_stack(self, e, self->n - last, self->n);
+}
+
+HSEP_API void hsep_averaged_keep_ahead(hsep_averaged *self, int is_known)
+{
+    const hsep_int Np = self->Np, count = HSEP_N_EXPERTS * Np, last = self->n_ahead - 1;
+    hsep_real *ahead = hsep_at(self, self->ahead);
+    memmove(ahead, ahead + count, (size_t)(last * count) * sizeof(hsep_real));
+    ahead += last * count;
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++, ahead += Np) {
+        const hsep_real *stacked = hsep_at(self, self->stacked) + i * self->n + (self->n - self->n_ahead * Np);
+        for (hsep_int j = 0; j < Np; j++) {
+            ahead[j] = is_known ? stacked[j] : NAN;
+        }
+    }
 }
 
 HSEP_API void hsep_averaged_forecast(

@@ -32,7 +32,9 @@ static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], co
     if (self->forecast_scale != learned->velocity_scale) {
         hsep_warm_start_forget(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL));
         hsep_warm_start_believe_earlier(hsep_averaged_evidence(self, HSEP_COMMAND_RESIDUAL));
-        hsep_stack_forget(&learned->stack, HSEP_FRESH_START);
+        for (hsep_int i = 0; i < HSEP_N_STACKS; i++) {
+            hsep_stack_forget(&learned->stacks[i], HSEP_FRESH_START);
+        }
     }
     for (hsep_int i = 0; fold && i < HSEP_N_RESIDUALS; i++) { /* of more rows than can be counted, half */
         hsep_warm_start *evidence = hsep_averaged_evidence(self, i);
@@ -237,29 +239,32 @@ HSEP_API void hsep_averaged_follow(
     }
 }
 
-/* Update the weights of the stack with the accepted samples that were published. */
-static void averaged_judge_stack(hsep_averaged *self, const hsep_real e[])
+/* Update the weights of the stack with the accepted samples that were published, and of that of plans with them and
+ * what a plan stacked for the window, if one did. */
+static void averaged_judge_stacks(hsep_averaged *self, const hsep_real e[])
 {
-    const hsep_real *accepted = hsep_at(self, self->accepted), *signals[HSEP_N_EXPERTS + 1];
-    const hsep_int count = self->Np - (self->late < self->Np ? self->late : 0);
-    hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1] = {{0.0}}, n = 0.0, *counted = hsep_at(self, self->x);
+    const hsep_real *accepted = hsep_at(self, self->accepted), *ahead = hsep_at(self, self->ahead);
+    const hsep_real *signals[HSEP_N_EXPERTS + 1];
+    hsep_real *work = hsep_at(self, self->x);
+    hsep_stack *stack = &self->learned.stacks[HSEP_OF_PREDICTIONS];
+    hsep_stack_products products = {{{0.0}}, 0.0};
     for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         signals[i] = hsep_at(self, self->stacked) + (self->n - self->Np) + i * self->n;
     }
     signals[HSEP_N_EXPERTS] = e;
-    for (hsep_int j = 0; j < count; j++) {
-        n += accepted[j];
+    hsep_stack_add(&products, signals, accepted, work, self->Np - (self->late < self->Np ? self->late : 0));
+    if (products.n == 0.0) {
+        return;
     }
-    for (hsep_int i = 0; i <= HSEP_N_EXPERTS; i++) {
-        for (hsep_int j = 0; j < count; j++) {
-            counted[j] = accepted[j] * signals[i][j];
+    hsep_stack_update(stack, &products, self->least_variance, NULL);
+    if (self->n_ahead > 0) {
+        for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
+            signals[i] = ahead + i * self->Np;
         }
-        for (hsep_int l = i; l <= HSEP_N_EXPERTS; l++) {
-            products[i][l] = hsep_dot(counted, signals[l], count);
+        if (!isnan(ahead[0])) {
+            hsep_stack_add(&products, signals, accepted, work, self->Np);
         }
-    }
-    if (n > 0.0) {
-        hsep_stack_update(&self->learned.stack, products, n, self->least_variance);
+        hsep_stack_update(&self->learned.stacks[HSEP_OF_PLANS], &products, self->least_variance, stack->weights);
     }
 }
 
@@ -268,8 +273,8 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
 {
     hsep_learned *learned = &self->learned;
     averaged_judge_experts(self, e, self->Np, learned->scales, learned->errors);
-    averaged_judge_stack(self, e);
-    const hsep_stack *stack = &learned->stack;
+    averaged_judge_stacks(self, e);
+    const hsep_stack *stack = &learned->stacks[HSEP_OF_PREDICTIONS];
     const hsep_int led = self->leading;
     const hsep_real squares = stack->evidence[0] - 2.0 * stack->cross[led] + stack->gram[led * (HSEP_N_EXPERTS + 1)];
     const hsep_real least = HSEP_AVERAGING_DISCARD_ERROR * learned->scales[HSEP_MODEL_RESIDUAL].largest_square;
@@ -282,7 +287,9 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
         }
         errors[0] = errors[HSEP_STATIC - HSEP_REGRESSIONS] = (hsep_expert_errors){0.0, 1.0};
         errors[self->leading - HSEP_REGRESSIONS] = errors[HSEP_FRESH_START - HSEP_REGRESSIONS];
-        hsep_stack_init(&learned->stack);
+        for (hsep_int i = 0; i < HSEP_N_STACKS; i++) {
+            hsep_stack_init(&learned->stacks[i]);
+        }
         hsep_averaged_prepare_solutions(self, learned->scales, errors);
     }
 }

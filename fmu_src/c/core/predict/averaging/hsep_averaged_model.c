@@ -53,6 +53,9 @@ HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_residua
     self->accepted = hsep_take(&end, Np);
     self->e_0 = hsep_take(&end, Np + p_of_command);
     self->stacked = hsep_take(&end, HSEP_N_EXPERTS * n);
+    const hsep_int half = (self->n - self->late) / (2 * self->Np);
+    self->n_ahead = !parameters->planned ? 0 : half > 0 ? half : 1;
+    self->ahead = hsep_take(&end, (hsep_real)self->n_ahead * HSEP_N_EXPERTS * Np);
     self->recalled = hsep_take(&end, n);
     self->e_h = hsep_take(&end, n);
     self->variance = hsep_take(&end, n);
@@ -74,7 +77,12 @@ HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parame
 {
     (void)hsep_averaged_lay_out(self, parameters);
     self->leading = HSEP_ARX_RESIDUAL;
-    hsep_stack_init(&self->learned.stack);
+    for (hsep_int i = 0; i < HSEP_N_STACKS; i++) {
+        hsep_stack_init(&self->learned.stacks[i]);
+    }
+    for (hsep_int i = 0; i < self->n_ahead; i++) {
+        hsep_averaged_keep_ahead(self, 0);
+    }
     hsep_disturbances_init(hsep_averaged_disturbances(self), parameters, start);
     (void)hsep_command_lay_out(hsep_averaged_command(self), parameters);
     (void)hsep_recall_lay_out(hsep_averaged_recall(self), parameters);
@@ -132,16 +140,21 @@ HSEP_API void hsep_averaged_restart(hsep_averaged *self)
         hsep_warm_start_begin_run(
             hsep_averaged_evidence(self, i), HSEP_AVERAGING_WARM_WINDOWS_MAX * (hsep_real)self->Np);
     }
-    self->leading = hsep_stack_leader(&learned->stack);
+    self->leading = hsep_stack_leader(&learned->stacks[HSEP_OF_PREDICTIONS]);
+    if (learned->stacks[HSEP_OF_PLANS].evidence[1] == 0.0) { /* learned without plans */
+        learned->stacks[HSEP_OF_PLANS] = learned->stacks[HSEP_OF_PREDICTIONS];
+    }
     const hsep_expert_shape shape = averaged_shape(self, HSEP_FRESH_START);
     hsep_expert_init(hsep_averaged_expert(self, HSEP_FRESH_START), &shape);
     *doubting = (hsep_expert_errors){0.0, 1.0};
     self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = 0;
     self->reach.farthest = 0.0;
-    hsep_stack_forget(&learned->stack, HSEP_FRESH_START);
-    if (hsep_averaged_doubts(self)) {
-        *doubting = learned->errors[self->leading - HSEP_REGRESSIONS];
-        hsep_stack_copy(&learned->stack, self->leading, HSEP_FRESH_START);
+    for (hsep_int i = 0; i < HSEP_N_STACKS; i++) {
+        hsep_stack_forget(&learned->stacks[i], HSEP_FRESH_START);
+        if (hsep_averaged_doubts(self)) {
+            *doubting = learned->errors[self->leading - HSEP_REGRESSIONS];
+            hsep_stack_copy(&learned->stacks[i], self->leading, HSEP_FRESH_START);
+        }
     }
     hsep_averaged_prepare_solutions(self, learned->scales, learned->errors);
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {

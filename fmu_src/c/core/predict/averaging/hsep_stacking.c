@@ -1,6 +1,7 @@
 #include "hsep_stacking.h"
 
 #include "hsep_math.h"
+#include "hsep_vector.h"
 
 #include <string.h>
 
@@ -87,27 +88,45 @@ static void stack_minimise(
     }
 }
 
+HSEP_API void hsep_stack_add(
+    hsep_stack_products *self, const hsep_real *const signals[HSEP_N_EXPERTS + 1], const hsep_real counts[],
+    hsep_real work[], hsep_int count)
+{
+    for (hsep_int j = 0; j < count; j++) {
+        self->n += counts[j];
+    }
+    for (hsep_int i = 0; i <= HSEP_N_EXPERTS; i++) {
+        for (hsep_int j = 0; j < count; j++) {
+            work[j] = counts[j] * signals[i][j];
+        }
+        for (hsep_int l = i; l <= HSEP_N_EXPERTS; l++) {
+            self->of[i][l] += hsep_dot(work, signals[l], count);
+        }
+    }
+}
+
 HSEP_API void hsep_stack_update(
-    hsep_stack *self, hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], hsep_real n, hsep_real least)
+    hsep_stack *self, const hsep_stack_products *products, hsep_real least, const hsep_real like[])
 {
     hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], l[HSEP_N_EXPERTS];
-    self->evidence[0] = HSEP_AVERAGING_GAMMA * self->evidence[0] + products[HSEP_N_EXPERTS][HSEP_N_EXPERTS];
-    self->evidence[1] = HSEP_AVERAGING_GAMMA * self->evidence[1] + n;
+    self->evidence[0] = HSEP_AVERAGING_GAMMA * self->evidence[0] + products->of[HSEP_N_EXPERTS][HSEP_N_EXPERTS];
+    self->evidence[1] = HSEP_AVERAGING_GAMMA * self->evidence[1] + products->n;
     hsep_real best = self->evidence[0]; /* of the prediction 0, which is always there */
     for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         for (hsep_int j = 0; j < HSEP_N_EXPERTS; j++) {
             hsep_real *gram = &self->gram[HSEP_N_EXPERTS * i + j];
-            *gram = HSEP_AVERAGING_GAMMA * *gram + products[i < j ? i : j][i < j ? j : i];
+            *gram = HSEP_AVERAGING_GAMMA * *gram + products->of[i < j ? i : j][i < j ? j : i];
             H[i][j] = *gram;
         }
-        self->cross[i] = HSEP_AVERAGING_GAMMA * self->cross[i] + products[i][HSEP_N_EXPERTS];
+        self->cross[i] = HSEP_AVERAGING_GAMMA * self->cross[i] + products->of[i][HSEP_N_EXPERTS];
         best = hsep_fmin(best, self->evidence[0] - 2.0 * self->cross[i] + H[i][i]);
     }
     const hsep_real square = hsep_fmax(hsep_fmax(best / self->evidence[1], least), HSEP_STACKING_LEAST_SQUARE);
-    const hsep_real ridge = HSEP_AVERAGING_KAPPA * square * n;
+    const hsep_real kappa = like != NULL ? HSEP_AVERAGING_KAPPA_OF_PLANS : HSEP_AVERAGING_KAPPA;
+    const hsep_real ridge = kappa * square * products->n;
     for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         H[i][i] += ridge;
-        l[i] = self->cross[i] + ridge * hsep_expert_of(i).first_weight;
+        l[i] = self->cross[i] + ridge * (like != NULL ? like[i] : hsep_expert_of(i).first_weight);
     }
     stack_minimise(H, l, self->weights);
 }

@@ -34,6 +34,9 @@ typedef struct {
     hsep_real evidence[2];                           /* e' e so far, m2, and samples */
 } hsep_stack;
 
+/* Stacks of a model: of predictions, and of a compensator's plans, by errors half a plan ahead, too. */
+enum { HSEP_OF_PREDICTIONS, HSEP_OF_PLANS, HSEP_N_STACKS };
+
 #define HSEP_STACK_WORDS (HSEP_N_EXPERTS * (HSEP_N_EXPERTS + 2) + 2)
 
 HSEP_ASSERT_WORDS(hsep_stack, HSEP_STACK_WORDS);
@@ -41,11 +44,23 @@ HSEP_ASSERT_WORDS(hsep_stack, HSEP_STACK_WORDS);
 /* Begin without evidence. */
 HSEP_API void hsep_stack_init(hsep_stack *self);
 
-/* Update the weights with a measured window. products: (HSEP_N_EXPERTS + 1,) by as many, upper triangle, m2: the scalar
- * products over it of the predictions and, last, of what was measured; n: its samples, > 0; least: least mean square
- * that errors are judged by, m2. Constant cost. */
+/* Scalar products over n samples of the predictions and, last, of what was measured, m2: upper triangle. */
+typedef struct {
+    hsep_real of[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1];
+    hsep_real n;
+} hsep_stack_products;
+
+/* Add count samples. signals: each expert's predictions and, last, what was measured, (count,), m; counts: (count,), 1,
+ * or 0 where it was not; work: (count,). */
+HSEP_API void hsep_stack_add(
+    hsep_stack_products *self, const hsep_real *const signals[HSEP_N_EXPERTS + 1], const hsep_real counts[],
+    hsep_real work[], hsep_int count);
+
+/* Update the weights with a measured window, of one sample or more. least: least mean square that errors are judged by,
+ * m2; like: (HSEP_N_EXPERTS,) weights of another stack, in place of the first weights and with more weight; or NULL.
+ * Constant cost. */
 HSEP_API void hsep_stack_update(
-    hsep_stack *self, hsep_real products[HSEP_N_EXPERTS + 1][HSEP_N_EXPERTS + 1], hsep_real n, hsep_real least);
+    hsep_stack *self, const hsep_stack_products *products, hsep_real least, const hsep_real like[]);
 
 /* Weights of all experts but HSEP_RECALL, 0, with its weight shared among them and physics. */
 HSEP_API void hsep_stack_others(const hsep_stack *self, hsep_real others[HSEP_N_EXPERTS]);
