@@ -81,7 +81,7 @@ def test_earlier_runs_are_forgotten_where_what_they_taught_errs_enough(share: fl
     predicted[FRESH_START.place], predicted[ARX_RESIDUAL.place] = measured, measured - share * largest
     stack = Stack.init().update(predicted, measured, NOISE**2)
     assert stack.weights[FRESH_START.place] > CONSTANTS.discard_above
-    change_learned(warm, stack=stack)
+    change_learned(warm, stacks=(stack, stack))
     run(warm, np.zeros(100), NOISE * np.random.default_rng(9).normal(size=100))
     assert averaged_model(warm).doubts == kept
 

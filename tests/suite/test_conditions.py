@@ -60,7 +60,7 @@ def learned(model: str, leading: Regression = ARX_RESIDUAL, **sizes: Any) -> byt
     predictor = machine.new_predictor(replace(machine.predictor_settings, averaging=True, **sizes))
     backtest(predictor, *moved(model))
     stack = averaged_model(predictor).learned.stack
-    change_learned(predictor, stack=replace(stack, weights=np.eye(len(EXPERTS))[leading.place]))
+    change_learned(predictor, stacks=(replace(stack, weights=np.eye(len(EXPERTS))[leading.place]),) * 2)
     return weights_file(predictor)
 
 

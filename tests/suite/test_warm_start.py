@@ -30,7 +30,9 @@ def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
     predictor = HybridPredictor.load(trained_state(COMPENSATOR))
     stack = averaged_model(predictor).learned.stack
     weights, less = np.eye(len(EXPERTS))[ARX_COMMAND.place], 1e-3
-    change_learned(predictor, stack=Stack(weights, less * stack.gram, less * stack.cross, less * stack.evidence))
+    change_learned(
+        predictor, stacks=(Stack(weights, less * stack.gram, less * stack.cross, less * stack.evidence),) * 2
+    )
     predictor.save(path)
     return path
 

@@ -261,7 +261,7 @@ static void averaged_judge_stacks(hsep_averaged *self, const hsep_real e[])
         for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
             signals[i] = ahead + i * self->Np;
         }
-        if (!isnan(ahead[0])) {
+        if (hsep_within(ahead, HSEP_N_EXPERTS * self->Np, HSEP_PREDICTION_MAX)) { /* it was known */
             hsep_stack_add(&products, signals, accepted, work, self->Np);
         }
         hsep_stack_update(&self->learned.stacks[HSEP_OF_PLANS], &products, self->least_variance, stack->weights);
