@@ -4,8 +4,8 @@ With the paper's model a plan is on eq. (3), and on the physics model where the 
 soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan. Where its
 own plan runs away, it plans none for a time, and one that ends compensation is judged in place of the remainder; that
 is followed, too, where compensation is switched off, or has tripped. It weighs its experts by their errors in the
-window and half a plan ahead, so that the expert of the next 20 ms alone does not plan what comes behind them. A motion faster than all of its run is compensated
-with at most half of the largest change.
+window and half a plan ahead, so that the expert of the next 20 ms alone does not plan what comes behind them. A motion
+faster than all of its run is compensated with at most half of the largest change.
 """
 
 import math

@@ -26,6 +26,7 @@ from hybridsep.machines.machine import Machine
 from hybridsep.online.look_ahead import SepState
 from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
+from hybridsep.predict.averaging.stacking import Stack
 from hybridsep.predict.predictor import HybridPredictor
 
 AVERAGED = PredictorSettings(Np=50, p=20)
@@ -126,6 +127,35 @@ def test_samples_behind_the_window_share_a_variance(monkeypatch: pytest.MonkeyPa
     own = plan_model(sep, x_d).predict(x_d)
     np.testing.assert_array_equal(shared.e_h[: Np + 1], own.e_h[: Np + 1])
     assert 0.0 < np.std(shared.e_h - own.e_h) < 0.1 * np.std(own.e_h)
+
+
+def test_plans_weigh_by_what_they_stacked_half_their_length_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each window is judged as it was predicted, and as the plan stacked it that began a window before it."""
+    stacked: list[Array] = []
+    judged: list[tuple[Array, Array]] = []
+    choose, update = AveragedPlanning.choose, Stack.update
+
+    def planned(self: AveragedPlanning, *arguments: Any) -> ChosenPlan:
+        plan = choose(self, *arguments)
+        stacked.append(self.ahead[-1].copy())
+        return plan
+
+    def updated(self: Stack, predicted: Array, measured: Array, least: float, like: Array | None = None) -> Stack:
+        if like is not None:
+            judged.append((predicted, measured))
+        return update(self, predicted, measured, least, like)
+
+    monkeypatch.setattr(AveragedPlanning, "choose", planned)
+    monkeypatch.setattr(Stack, "update", updated)
+    sep = compensator()
+    run(sep)
+    assert len(stacked) == 4 + len(judged) + 1  # windows: before the trajectory, learned, and the next
+    before = stacked[3 : 3 + len(judged)]
+    assert sum(np.isfinite(one).all() for one in before) > 5
+    for (predicted, measured), ahead in zip(judged, before, strict=True):
+        assert len(measured) == (100 if np.isfinite(ahead).all() else 50)
+        np.testing.assert_array_equal(measured[50:], measured[: len(measured) - 50])
+        np.testing.assert_array_equal(predicted[:, 50:], ahead[:, : len(measured) - 50])
 
 
 @pytest.mark.slow

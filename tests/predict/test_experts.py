@@ -184,13 +184,15 @@ def replayed(stack: Stack, errors: tuple[float, float, float], n_windows: int, s
     return stack
 
 
-def test_its_weights_are_the_formula() -> None:
-    """Two windows by a general solver of the whole problem, with ``s²`` of the best expert."""
+@pytest.mark.parametrize("like", [None, np.linspace(0.0, 0.3, N_EXPERTS)])
+def test_its_weights_are_the_formula(like: Array | None) -> None:
+    """Two windows by a general solver of the whole problem, with ``s²`` of the best expert; of plans, too."""
+    prior, kappa = (FIRST, CONSTANTS.kappa) if like is None else (like, CONSTANTS.kappa_of_plans)
     rng = np.random.default_rng(5)
     windows = [(experts(rng.normal(size=(3, NP))), rng.normal(size=NP)) for _ in range(2)]
     stack = Stack.init()
     for predicted, measured in windows:
-        stack = stack.update(predicted, measured, 0.0)
+        stack = stack.update(predicted, measured, 0.0, like)
     fades = (CONSTANTS.gamma, 1.0)
     squares = [0.0] * (N_EXPERTS + 1)
     for fade, (predicted, measured) in zip(fades, windows, strict=True):
@@ -200,7 +202,7 @@ def test_its_weights_are_the_formula() -> None:
 
     def cost(pi: Array) -> float:
         misfit = sum(f * float(np.sum((e - pi @ F) ** 2)) for f, (F, e) in zip(fades, windows, strict=True))
-        return misfit + CONSTANTS.kappa * s_2 * NP * float(np.sum((pi - FIRST) ** 2))
+        return misfit + kappa * s_2 * NP * float(np.sum((pi - prior) ** 2))
 
     found = minimize(
         cost,

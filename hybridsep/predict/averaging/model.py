@@ -427,7 +427,8 @@ def _judged(
     n, late = len(accepted), settings.n_late
     published = accepted & (np.arange(n) >= late) if late < n else accepted
     if published.any():
-        (stack, of_plans), measured, predicted = learned.stacks, e[MODEL_RESIDUAL], forecast.stacked[:, :n][:, published]
+        (stack, of_plans), measured = learned.stacks, e[MODEL_RESIDUAL]
+        predicted = forecast.stacked[:, :n][:, published]
         stack = stack.update(predicted, measured[published], settings.lam)
         if ahead is not None:
             known = accepted & np.isfinite(ahead).all()
