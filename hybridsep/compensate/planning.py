@@ -84,8 +84,8 @@ class Planning(ABC):
     SOLVED: ClassVar[Tolerance]  # to which programmes are solved
     paused: int  # windows that the residual model does not plan now
     pause: int  # and after its next plan that runs away
-    # (m, n_experts, Np), m: what the last plans stacked half their length ahead, NaN where nothing; first for this
-    # window, last by its own plan; none with the paper's model
+    # shape (n_ahead, n_experts, Np), in m: entry i is what is stacked for the i-th window from this one, by the plan of
+    # half a plan before it, the last one by this window's; NaN where nothing is known; with the paper's model none
     ahead: Array
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
@@ -111,7 +111,7 @@ class Planning(ABC):
 
     @property
     def due(self) -> Array | None:
-        """What the residual model's plan of half its length ago stacked for this window, ``(n_experts, Np)``, m."""
+        """What the plan of half its length ago stacked for this window, ``(n_experts, Np)``, in m; None without any."""
         return self.ahead[0] if len(self.ahead) else None
 
     @abstractmethod
@@ -306,6 +306,7 @@ class AveragedPlanning(Planning):
             x_d = path + self.basis.delta(previous_plan)
             model = PlanModel(averaged.for_plans(), state.physics, state.late, predictor.start, x_d, path, preview.load)
         scales = model.scales  # of the remainder of the last plan
+        self.ahead[-1] = np.nan
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, self.without_model(preview), scales)
         g, free = predictor.physics_operator(self.horizon)

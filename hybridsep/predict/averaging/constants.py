@@ -14,8 +14,8 @@ class AveragingConstants:
 
     # weight of the prior ``π₀`` of the stack, in windows: 0.3 or 3 change errors by 1 to 3 %
     kappa: float = 1.0
-    # weight of the prior of the stack that plans weigh by, which is the stack itself, relative to that one's: without
-    # that prior random drives have 1.03 to 1.07 times the error, with 30 or 100 axes that swing gain half as much
+    # the same of the stack of plans, whose prior are the weights of the other one: without it random drives have 1.03
+    # to 1.07 times the error, with 30 windows axes that swing gain less
     kappa_of_plans: float = 10.0
     # factor by which the stack's evidence fades from window to window: 0.9 or 0.98 change errors by 1 to 3 %
     gamma: float = 0.95

@@ -83,7 +83,7 @@ class Learned:
     # pair of ResidualScale: sizes of the residuals, of the physics model and of the command
     scales: tuple[ResidualScale, ResidualScale]
     errors: tuple[ExpertErrors, ...]  # of the regressions
-    # pair: of predictions, and of a compensator's plans, by errors half a plan ahead, too
+    # pair: of predictions, and of plans, by errors half a plan ahead, too; without plans the same
     stacks: tuple[Stack, ...]
     largest: Array  # (n_static,): largest magnitudes of the static features
 
@@ -207,8 +207,11 @@ class AveragedModel:
         """Return the model at the beginning of another run, at rest; what was learned is kept, and doubted."""
         learned, most = self.learned, CONSTANTS.warm_windows_max * self.settings.Np
         evidence = self.evidence[0].begin_run(most), self.evidence[1].begin_run(most)
-        leading, (stack, of_plans), errors = learned.stack.leader, learned.stacks, ExpertErrors()
-        stacks = [one.forget(FRESH_START) for one in (stack, of_plans if of_plans.evidence[1] else stack)]
+        leading, errors, stacks = (
+            learned.stack.leader,
+            ExpertErrors(),
+            [one.forget(FRESH_START) for one in learned.stacks],
+        )
         if evidence[MODEL_RESIDUAL].earlier.n_rows > 0.0:
             stacks, errors = [one.copy(leading, FRESH_START) for one in stacks], learned.errors_of(leading)
         learned = replace(learned.with_errors({FRESH_START: errors}), stacks=tuple(stacks))
@@ -283,11 +286,11 @@ class AveragedModel:
         at, stacked = replace(at, predictions=predictions), np.empty((len(EXPERTS), len(x)))
         for one in EXPERTS:
             stacked[one.place] = one.forecast(at)
-        others, (_, _, alike), recall = self.learned.stack.others(), at.recalled, RECALL.place
-        shares = self.learned.stack.weights + self.learned.stack.weights[recall] * (1.0 - alike) * others
-        shares[recall] = self.learned.stack.weights[recall] * alike
+        others, weights = self.learned.stack.others(), self.learned.stack.weights
+        (_, _, alike), recall = at.recalled, RECALL.place
+        shares = weights + weights[recall] * (1.0 - alike) * others
+        shares[recall] = weights[recall] * alike
         stacked[recall] = alike * stacked[recall] + (1.0 - alike) * (others @ stacked)
-        weights = self.learned.stack.weights
         e_h = weights @ stacked
         second = stacked**2  # second moments of the residual by each expert; hold and physics have no variance
         for one, prediction in predictions.items():
@@ -324,7 +327,7 @@ class AveragedModel:
 
         ``forecast``: of this state; ``x``, (m,), m: measured positions of its first ``m`` samples, relative to the
         start; NaN where missing; ``fold``: whether they are learned; the next window starts from them in any case;
-        ``ahead``, (n_experts, m), m: of a compensator, what a plan stacked for the window, NaN where none did.
+        ``ahead``, shape (n_experts, m), in m: of a compensator, what a plan stacked for the window; NaN if none did.
         Returns (m,): which samples are accepted.
         """
         m, run = len(x), self.run
@@ -429,13 +432,14 @@ def _judged(
     if published.any():
         (stack, of_plans), measured = learned.stacks, e[MODEL_RESIDUAL]
         predicted = forecast.stacked[:, :n][:, published]
-        stack = stack.update(predicted, measured[published], settings.lam)
+        stack = of_both = stack.update(predicted, measured[published], settings.lam)
         if ahead is not None:
             known = accepted & np.isfinite(ahead).all()
+            ahead = np.where(state.doubts | (np.arange(len(ahead)) != FRESH_START.place)[:, None], ahead, 0.0)
             predicted = np.hstack((predicted, ahead[:, known]))
             measured = np.concatenate((measured[published], measured[known]))
-            of_plans = of_plans.update(predicted, measured, settings.lam, stack.weights)
-        learned = replace(learned, stacks=(stack, of_plans))
+            of_both = of_plans.update(predicted, measured, settings.lam, stack.weights)
+        learned = replace(learned, stacks=(stack, of_both))
     stack, led = learned.stack, state.leading.place
     squares = stack.evidence[0] - 2.0 * stack.cross[led] + stack.gram[led, led]
     least = CONSTANTS.discard_error * learned.scales[MODEL_RESIDUAL].largest_square * stack.evidence[1]

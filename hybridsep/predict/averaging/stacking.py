@@ -20,7 +20,8 @@ class Stack:
     """Weights ``π ≥ 0``, ``Σπ ≤ 1`` of experts; the remainder is the prediction 0, the physics model's.
 
     ``π = argmin ‖e − F π‖² + κ s² n ‖π − π₀‖²`` over the windows so far, their evidence fading by ``γ`` a window, with
-    the mean square ``s²`` of the best expert and ``n`` samples of a window: without evidence ``π = π₀``.
+    the mean square ``s²`` of the best expert and ``n`` samples of a window: without evidence ``π = π₀``. In the stack
+    of plans ``π₀`` are the weights of the other one, and ``κ`` is larger.
     """
 
     weights: Array  # (n_experts,): ``π``
@@ -39,8 +40,8 @@ class Stack:
         """Return the stack with a measured window more.
 
         ``predicted``, (n_experts, n), m: predictions made before the window was measured; ``measured``, (n,), m;
-        ``least``, m²: least mean square that errors are judged by; ``like``, (n_experts,): weights of another stack, in
-        place of ``π₀`` and with more weight.
+        ``least``, m²: least mean square that errors are judged by; ``like``, (n_experts,): weights of the stack of
+        predictions, if it is that of plans.
         """
         prior, kappa = (_first_weights(), CONSTANTS.kappa) if like is None else (like, CONSTANTS.kappa_of_plans)
         gamma, n = CONSTANTS.gamma, len(measured)

@@ -144,9 +144,9 @@ static void averaged_weigh(hsep_averaged *self, hsep_int place)
 {
     const hsep_stack *stack = &self->learned.stacks[place];
     const hsep_real recalled = stack->weights[HSEP_RECALL];
+    self->weighs = place;
     hsep_stack_others(stack, self->others);
     for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
-        self->weights[i] = stack->weights[i];
         self->shares[i] = stack->weights[i] + recalled * (1.0 - self->alike) * self->others[i];
     }
     self->shares[HSEP_RECALL] = recalled * self->alike;
@@ -166,7 +166,7 @@ static void averaged_recall(hsep_averaged *self, hsep_real last)
 /* e: the stack of the experts, which have predicted the places begin ... end - 1. */
 static void averaged_stack(hsep_averaged *self, hsep_real e[], hsep_int begin, hsep_int end)
 {
-    const hsep_real *weights = self->weights, *recalled = hsep_at(self, self->recalled);
+    const hsep_real *weights = self->learned.stacks[self->weighs].weights, *recalled = hsep_at(self, self->recalled);
     hsep_real *stacked = hsep_at(self, self->stacked);
     hsep_real *variance = hsep_at(self, self->variance);
     for (hsep_int j = begin; j < end; j++) {
@@ -231,11 +231,12 @@ HSEP_API void hsep_averaged_keep_ahead(hsep_averaged *self, int is_known)
     hsep_real *ahead = hsep_at(self, self->ahead);
     memmove(ahead, ahead + count, (size_t)(last * count) * sizeof(hsep_real));
     ahead += last * count;
-    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++, ahead += Np) {
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         const hsep_real *stacked = hsep_at(self, self->stacked) + i * self->n + (self->n - self->n_ahead * Np);
-        for (hsep_int j = 0; j < Np; j++) {
-            ahead[j] = is_known ? stacked[j] : NAN;
-        }
+        memcpy(ahead + i * Np, stacked, (size_t)Np * sizeof(hsep_real));
+    }
+    if (!is_known) {
+        ahead[0] = (hsep_real)NAN;
     }
 }
 

@@ -240,13 +240,12 @@ HSEP_API void hsep_averaged_follow(
 }
 
 /* Update the weights of the stack with the accepted samples that were published, and of that of plans with them and
- * what a plan stacked for the window, if one did. */
+ * what a plan stacked for the window, if one did; without plans both are the same. */
 static void averaged_judge_stacks(hsep_averaged *self, const hsep_real e[])
 {
-    const hsep_real *accepted = hsep_at(self, self->accepted), *ahead = hsep_at(self, self->ahead);
-    const hsep_real *signals[HSEP_N_EXPERTS + 1];
-    hsep_real *work = hsep_at(self, self->x);
-    hsep_stack *stack = &self->learned.stacks[HSEP_OF_PREDICTIONS];
+    const hsep_real *accepted = hsep_at(self, self->accepted), *signals[HSEP_N_EXPERTS + 1];
+    hsep_real *work = hsep_at(self, self->x), *ahead = hsep_at(self, self->ahead);
+    hsep_stack *stack = &self->learned.stacks[HSEP_OF_PREDICTIONS], *of_plans = &self->learned.stacks[HSEP_OF_PLANS];
     hsep_stack_products products = {{{0.0}}, 0.0};
     for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         signals[i] = hsep_at(self, self->stacked) + (self->n - self->Np) + i * self->n;
@@ -257,15 +256,20 @@ static void averaged_judge_stacks(hsep_averaged *self, const hsep_real e[])
         return;
     }
     hsep_stack_update(stack, &products, self->least_variance, NULL);
-    if (self->n_ahead > 0) {
-        for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
-            signals[i] = ahead + i * self->Np;
-        }
-        if (hsep_within(ahead, HSEP_N_EXPERTS * self->Np, HSEP_PREDICTION_MAX)) { /* it was known */
-            hsep_stack_add(&products, signals, accepted, work, self->Np);
-        }
-        hsep_stack_update(&self->learned.stacks[HSEP_OF_PLANS], &products, self->least_variance, stack->weights);
+    if (self->n_ahead == 0) {
+        *of_plans = *stack;
+        return;
     }
+    for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
+        signals[i] = ahead + i * self->Np;
+    }
+    if (hsep_within(ahead, HSEP_N_EXPERTS * self->Np, HSEP_PREDICTION_MAX)) { /* it was known */
+        if (!hsep_averaged_doubts(self)) {                                    /* and is not forgotten since */
+            memset(ahead + HSEP_FRESH_START * self->Np, 0, (size_t)self->Np * sizeof(hsep_real));
+        }
+        hsep_stack_add(&products, signals, accepted, work, self->Np);
+    }
+    hsep_stack_update(of_plans, &products, self->least_variance, stack->weights);
 }
 
 /* Judge the experts and their stack by the measurement of their window. */

@@ -141,9 +141,6 @@ HSEP_API void hsep_averaged_restart(hsep_averaged *self)
             hsep_averaged_evidence(self, i), HSEP_AVERAGING_WARM_WINDOWS_MAX * (hsep_real)self->Np);
     }
     self->leading = hsep_stack_leader(&learned->stacks[HSEP_OF_PREDICTIONS]);
-    if (learned->stacks[HSEP_OF_PLANS].evidence[1] == 0.0) { /* learned without plans */
-        learned->stacks[HSEP_OF_PLANS] = learned->stacks[HSEP_OF_PREDICTIONS];
-    }
     const hsep_expert_shape shape = averaged_shape(self, HSEP_FRESH_START);
     hsep_expert_init(hsep_averaged_expert(self, HSEP_FRESH_START), &shape);
     *doubting = (hsep_expert_errors){0.0, 1.0};

@@ -60,8 +60,8 @@ typedef struct {
     hsep_real growth;                   /* how much larger the command's bound may be, as its largest step is */
     hsep_int predicted[HSEP_N_EXPERTS]; /* whether an expert knows something */
     hsep_real alike;                    /* how much HSEP_RECALL counts */
-    hsep_real weights[HSEP_N_EXPERTS];  /* of the stack, */
-    hsep_real others[HSEP_N_EXPERTS];   /* of the others where HSEP_RECALL does not count, */
+    hsep_int weighs;                    /* stack that weighs now, HSEP_OF_PLANS while a plan is made */
+    hsep_real others[HSEP_N_EXPERTS];   /* its weights of the others where HSEP_RECALL does not count, */
     hsep_real shares[HSEP_N_EXPERTS];   /* and of all as they count */
     /* Of the window that is measured */
     hsep_int followed;    /* samples that were judged and, as far as they are believed, learned */
@@ -75,7 +75,7 @@ typedef struct {
     hsep_int e_0;              /* (Np + p of the command,) m, residual of the command */
     hsep_int stacked;  /* (HSEP_N_EXPERTS, n) m, what experts add to the physics model; 0 where one knows nothing */
     hsep_int ahead;    /* (n_ahead, HSEP_N_EXPERTS, Np) m, what is stacked half a plan ahead, oldest first */
-    hsep_int n_ahead;  /* windows of half a plan, or 0 */
+    hsep_int n_ahead;  /* windows of half a plan; 0 without a compensator */
     hsep_int recalled; /* (n,) m, what HSEP_RECALL predicts */
     hsep_int e_h;      /* (n,) m, residual that is predicted */
     hsep_int variance; /* (n,) m2, of the mixture of the experts */
@@ -91,7 +91,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_learned, HSEP_LEARNED_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_averaged,
-    37 + HSEP_N_RESIDUALS + 5 * HSEP_N_EXPERTS + HSEP_LEARNED_WORDS + sizeof(hsep_gate) / sizeof(hsep_real));
+    38 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + HSEP_LEARNED_WORDS + sizeof(hsep_gate) / sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_residual_parameters *parameters);
 /* Fill the block, which is 0, at rest at start, m, with nothing learned. */
@@ -158,10 +158,11 @@ HSEP_API void hsep_averaged_predict(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last, hsep_int apart);
 
 /* Weigh the experts as the stack of predictions does, as a forecast begins, or as that of plans; e, (n + p,), m: the
- * samples 0 ... last - 1 that were predicted are stacked anew. */
+ * samples 0 ... last - 1 that were predicted are stacked anew. Cost: 36 last multiply-adds. */
 HSEP_API void hsep_averaged_weigh(hsep_averaged *self, hsep_int stack, hsep_real e[], hsep_int last);
 
-/* Keep what is stacked half a plan ahead for the window that it is measured in; is_known: whether it was predicted. */
+/* Keep what is stacked half a plan ahead for the window that it is measured in; is_known: whether it was predicted.
+ * Cost: n_ahead HSEP_N_EXPERTS Np words are moved. */
 HSEP_API void hsep_averaged_keep_ahead(hsep_averaged *self, int is_known);
 
 /* Begin the run of that window, its first one, in motion: x_d and x_pb, (Np,), m, Np > 1, with the motion before it. */
