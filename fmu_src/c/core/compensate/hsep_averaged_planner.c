@@ -658,7 +658,7 @@ HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hse
     self->follows = self->judges && best > 1 && self->paused == 0;
     self->ends = (best == 0 && was_planned > 0) || (self->judges && best > 1 && self->paused > 0);
     self->paused -= self->paused > 0;
-    hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), 0); /* the work depends on their shares */
+    hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), 0); /* work follows from shares */
     const averaged_planner_work work = averaged_planner_work_of(self, task);
     /* This sample has cost that; what is learned at the end of the last window costs as much as commands of a plan */
     self->next = 3.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
