@@ -516,7 +516,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
 
     switch (self->place) {
     case 0:
-        /* The remainder of the last plan, with the variances of all plans; they weigh experts by a stack of their own */
+        /* The remainder of the last plan, with the variances of all plans, which have a stack of their own */
         hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), self->samples);
         if (self->judges) {
             AVERAGED_PLANNER_PREDICT(1, all, rest, 1)
