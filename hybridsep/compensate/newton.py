@@ -308,14 +308,16 @@ class AveragedPlanner:
         self._values, self._third = (one[:, N_DECIDED:] @ splines for one in (basis.values, basis.third))
         self._third_before = np.diff(np.concatenate((delta_before, np.zeros(basis.preview))), 3)
 
-    def point(self, coefficients: Array, change: Array | None = None) -> PlannedPoint:
-        """Return a plan with its cost, which is not finite if its prediction overflows."""
-        prediction = self._model.predict(self._x_d + self._basis.delta(coefficients))
-        return self._point(coefficients, self._unchanged if change is None else change, prediction)
-
-    def previous(self, previous_plan: Array) -> PlannedPoint:
-        """Return the remainder of the last plan."""
-        return self._point(previous_plan, self._unchanged, self._model.of_previous_plan)
+    def point(
+        self, coefficients: Array, change: Array | None = None, prediction: AveragedForecast | None = None
+    ) -> PlannedPoint:
+        """Return a plan, whose prediction may be known, with its cost, which is not finite if that overflows."""
+        at = prediction or self._model.predict(self._x_d + self._basis.values @ coefficients)
+        third = self._basis.third @ coefficients + self._third_before
+        x_h = self._model.position(at)
+        error = self._basis.weight * (self._x_d - x_h)
+        cost = float(error @ error) + self._jerk_weight * float(third @ third)
+        return PlannedPoint(coefficients, self._unchanged if change is None else change, at, x_h, third, cost)
 
     def plan(
         self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_followed: int, passed: Array
@@ -365,10 +367,3 @@ class AveragedPlanner:
             if is_better(end.cost, start.cost):
                 return end
         return start
-
-    def _point(self, coefficients: Array, change: Array, prediction: AveragedForecast) -> PlannedPoint:
-        third = self._basis.third @ coefficients + self._third_before
-        x_h = self._model.position(prediction)
-        error = self._basis.weight * (self._x_d - x_h)
-        cost = float(error @ error) + self._jerk_weight * float(third @ third)
-        return PlannedPoint(coefficients, change, prediction, x_h, third, cost)

@@ -188,15 +188,15 @@ class PaperPlanning(Planning):
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the plan of the best model that has one, else one without a model."""
-        candidates = self._candidates(predictor, most)
-        if not candidates:
+        if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, self.without_model(preview), None)
+        learned = predictor.k >= predictor.n_init and predictor.regression.n_rows > 0
+        hybrid = most is SepState.HYBRID and learned and has_stable_poles(predictor.residual_weights)
         bounds = self.limits(preview)
         with np.errstate(all="ignore"):  # a hybrid model that is no candidate may be unstable
             operator = predictor.operator(self.horizon)  # Eq. (3)
-        for state in candidates:
-            hybrid = state is SepState.HYBRID
-            g, free = (operator.g_h, operator.free) if hybrid else (operator.g_pb, operator.free_pb)
+        models = [(SepState.HYBRID, operator.g_h, operator.free), (SepState.PHYSICS, operator.g_pb, operator.free_pb)]
+        for state, g, free in models if hybrid else models[1:]:
             found = self.affine_plan(g, free, preview.command, preview, bounds)
             if found is not None:
                 return ChosenPlan(state, found, None)
@@ -208,17 +208,6 @@ class PaperPlanning(Planning):
         if state is SepState.HYBRID:
             return PublishedPosition(as_published(x_h + prediction.e_h, "x_h"), prediction.x_h_std, 0, 0)
         return PublishedPosition(x_h, np.zeros(Np), Np, 0)
-
-    def _candidates(self, predictor: HybridPredictor, most: SepState) -> list[SepState]:
-        """Return the candidate models, best first."""
-        hybrid = (
-            most is SepState.HYBRID
-            and predictor.k >= predictor.n_init
-            and predictor.regression.n_rows > 0
-            and has_stable_poles(predictor.residual_weights)
-        )
-        candidates = [SepState.HYBRID] if hybrid else []
-        return candidates + ([SepState.PHYSICS] if most is not SepState.OFF else [])
 
 
 def has_stable_poles(w_e: Array) -> bool:
@@ -303,7 +292,7 @@ class AveragedPlanning(Planning):
         assert predictor.start is not None
         path = preview.command - predictor.start
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
-            x_d = path + self.basis.delta(previous_plan)
+            x_d = path + self.basis.values @ previous_plan
             model = PlanModel(averaged.for_plans(), state.physics, state.late, predictor.start, x_d, path, preview.load)
         scales = model.scales  # of the remainder of the last plan
         self.ahead[-1] = np.nan
@@ -331,7 +320,8 @@ class AveragedPlanning(Planning):
                 self.basis, self.splines, self.settings.jerk_weight, model, path, preview.delta_before
             )
             ends = bool(self.paused) and most is SepState.HYBRID
-            last = planner.point(self.ending(preview)) if ends else planner.previous(previous_plan)
+            known = None if ends else model.of_previous_plan
+            last = planner.point(self.ending(preview) if ends else previous_plan, prediction=known)
             of_physics, is_away = planner.point(physics), False
             if follows:
                 bounds = self.limits(preview, may_turn=True, change=change)

@@ -294,12 +294,12 @@ def solve(
         return None
     if bounds.allow(c):
         return Minimum(c, 0)
-    pinned, problem = previous_plan[:n_pinned], cost.without(previous_plan[:n_pinned])
+    pinned = previous_plan[:n_pinned]
     rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
     touched = rows.any(axis=1)
     found = minimise(
-        problem.P,
-        problem.v,
+        cost.P[n_pinned:, n_pinned:],
+        cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ pinned,
         rows[touched],
         (bounds.low - taken)[touched] + tolerance.margin,
         (bounds.high - taken)[touched] - tolerance.margin,

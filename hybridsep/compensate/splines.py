@@ -67,11 +67,6 @@ class PlanCost:
         """Return the cost of a change of a ``plan``, ``(n,)``, m, by sums of splines, ``(n, m)``."""
         return PlanCost(splines.T @ self.P @ splines, splines.T @ (self.v - self.P @ plan))
 
-    def without(self, pinned: Array) -> "PlanCost":
-        """Return the cost of the other coefficients, where the first ones are ``pinned``, m."""
-        n = len(pinned)
-        return PlanCost(self.P[n:, n:], self.v[n:] - self.P[n:, :n] @ pinned)
-
 
 class SplineBasis:
     """B-spline basis of one plan.
@@ -89,22 +84,15 @@ class SplineBasis:
         self.n_free = (preview - width - _END) // spacing + 1
         spline = np.asarray(BSpline.basis_element(np.arange(5))(np.arange(width) / spacing))
         self._spline: Array = np.pad(spline, (0, preview - width))
-        # Tails of the splines at −3, −2, −1 spacings, then the free splines
-        tails = [np.append(self._spline[i * spacing :], np.zeros(i * spacing)) for i in (3, 2, 1)]
-        self.values: Array = np.column_stack((*tails, _shifts(self._spline, self.n_free, spacing)))
+        self.values = self.acting(preview, self.n_free)
         # Differences over the plan; the three samples before it enter by `before`
         self.third: Array = np.diff(np.pad(self.values, ((3, 0), (0, 0))), 3, axis=0)
 
-    def shifted(self, preview: int) -> Array:
-        """Return all splines that act in a preview, which goes on behind it: a matrix ``(preview, 3 + n)``."""
-        width, spacing = 4 * self.spacing, self.spacing
-        spline = np.pad(self._spline[:width], (0, preview))
+    def acting(self, preview: int, n: int) -> Array:
+        """Return the tails of the splines at −3, −2, −1 spacings and ``n`` that begin in it, ``(preview, 3 + n)``."""
+        spacing, spline = self.spacing, np.pad(self._spline[: 4 * self.spacing], (0, preview))
         tails = [spline[i * spacing : preview + i * spacing] for i in (3, 2, 1)]
-        return np.column_stack((*tails, _shifts(spline[:preview], -(-preview // spacing), spacing)))
-
-    def delta(self, coefficients: Array) -> Array:
-        """Return the change of the command over the plan, ``(preview,)``, m."""
-        return np.asarray(self.values @ coefficients)
+        return np.column_stack((*tails, _shifts(spline[:preview], n, spacing)))
 
     def filtered(self, g: Array) -> Array:
         """Return the free splines filtered by the impulse response ``g``, ``(preview, n_free)``."""

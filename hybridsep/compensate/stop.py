@@ -40,7 +40,7 @@ class Stop:
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, preview: int, Np: int, n_pinned: int) -> None:
         self.spacing, self._horizon = basis.spacing, basis.preview
         self.n_shared = Np // basis.spacing + n_pinned
-        self.rows = bounds.rows_of(basis.shifted(preview))
+        self.rows = bounds.rows_of(basis.acting(preview, -(-preview // basis.spacing)))
         self.n = self.rows.shape[1]  # coefficients, the decided ones first
         shared, last = N_DECIDED + self.n_shared, N_DECIDED + (preview - PLAN_END) // basis.spacing - 2
         held = np.eye(last)[np.minimum(np.arange(self.n + 3), last - 1)]  # from the last one on all are alike

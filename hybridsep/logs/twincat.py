@@ -99,21 +99,19 @@ class TwinCatSource(ArraysSource):
             places[name] = _Place(i, max(time for time in times if time < i))
         self.names = list(places)
         self.times = {name: clocks[place.time] for name, place in places.items() if place.field != place.time}
-        units = {name: self._cell(_UNIT, places[name].field).partition("(")[0].strip() for name in self.times}
+        units = {
+            name: _cell(self._known.get(_UNIT, []), places[name].field).partition("(")[0].strip() for name in self.times
+        }
         stated = {name: unit for name, unit in units.items() if unit}  # of ``mm (Length)``; ``(None)`` states none
         self.units = {**stated, **dict.fromkeys(clocks.values(), "s")}
         self._intervals = {
             name: 1e-3 * float(text)
             for name in self.times
-            if is_number(text := decimal_points(self._cell(_SAMPLE_TIME, places[name].field)))
+            if is_number(text := decimal_points(_cell(self._known.get(_SAMPLE_TIME, []), places[name].field)))
         }
         fastest = min(self._intervals.values(), default=0.0)
         self._slow = {self.times[name] for name, interval in self._intervals.items() if interval > fastest}
         return places
-
-    def _cell(self, key: str, field: int) -> str:
-        row = self._known.get(key, [])
-        return row[field].strip() if field < len(row) else ""
 
     def _scale_times(self, head: Sequence[tuple[int, list[str]]], first: Sequence[str]) -> None:
         """Find out what times are counted in, and from when."""
@@ -136,7 +134,10 @@ class TwinCatSource(ArraysSource):
         """Return a field of all lines down to the last one that has it."""
         is_time = field in {place.time for place in self._places.values()}
         counted = is_time and self._counted
-        end = next((i for i in reversed(range(len(self._lines))) if self._row_cell(i, field)), -1) + 1
+        end = (
+            next((i for i in reversed(range(len(self._lines))) if _cell(self._lines[i].split(self._mark), field)), -1)
+            + 1
+        )
         try:
             kind, mark = np.int64 if counted else np.float64, self._mark
             values = np.loadtxt(self._lines[:end], kind, delimiter=mark, usecols=field, comments=None, ndmin=1)
@@ -148,6 +149,6 @@ class TwinCatSource(ArraysSource):
             return np.asarray((values - self._origin) * _COUNT, dtype=np.float64)
         return np.asarray(values * _MS if is_time else values, dtype=np.float64)
 
-    def _row_cell(self, i: int, field: int) -> str:
-        row = self._lines[i].split(self._mark)
-        return row[field].strip() if field < len(row) else ""
+
+def _cell(row: Sequence[str], field: int) -> str:
+    return row[field].strip() if field < len(row) else ""
