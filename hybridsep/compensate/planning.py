@@ -141,9 +141,9 @@ class Planning(ABC):
         last = previous_plan[N_DECIDED:]
         if self.splines is not None:
             cost = cost.of_change(last, self.splines).regular()
-            return _after(decided, solve_change(cost, bounds, last, self.splines, tolerance))
+            return solve_change(cost, bounds, previous_plan, self.splines, tolerance)
         found = solve(cost.regular(), bounds, last, self.n_pinned, tolerance=tolerance)
-        return _after(decided, None if found is None else found.x)
+        return None if found is None else np.concatenate((decided, found.x))
 
     def ending(self, preview: Preview) -> Array:
         """Return the coefficients, ``(3 + n_free,)``, m, of a plan that ends compensation, smoothly and soon.
@@ -159,7 +159,7 @@ class Planning(ABC):
         cost = cost.of_change(last, not_pinned).regular()
         new = np.arange(len(cost.v))[-(self.Np // self.spacing) :]
         cost.P[new, new] *= _NEW
-        found = _after(decided, solve_change(cost, self.limits(preview), last, not_pinned, self.SOLVED))
+        found = solve_change(cost, self.limits(preview), preview.previous_plan, not_pinned, self.SOLVED)
         return preview.previous_plan if found is None else found
 
     def without_model(self, preview: Preview) -> Array:
@@ -170,10 +170,6 @@ class Planning(ABC):
         """Return the drive's limits on the coefficients of a plan, and a share of the largest change."""
         before = preview.x_d_before, preview.delta_before, preview.previous_plan
         return self.bounds.bounds(preview.command, *before, may_turn=may_turn, change=change)
-
-
-def _after(decided: Array, free: Array | None) -> Array | None:
-    return None if free is None else np.concatenate((decided, free))
 
 
 _PINNED_PAPER = 8

@@ -320,9 +320,9 @@ def solve_change(
 ) -> Array | None:
     """Return the plan of least cost within the bounds that changes ``previous_plan`` by sums of splines, ``(n, m)``.
 
-    ``cost``: of the change; other parameters as of :func:`solve`. Returns the coefficients, ``(n,)``, m; None if there
-    is no finite minimiser.
+    ``cost``: of the change; ``previous_plan``: (3 + n,), m: the decided coefficients first; other parameters as of
+    :func:`solve`. Returns the coefficients, ``(3 + n,)``, m; None if there is no finite minimiser.
     """
-    of_change = bounds.of_change(previous_plan, splines)
-    found = solve(cost, of_change, np.zeros(splines.shape[1]), 0, tolerance=tolerance)
-    return None if found is None else np.asarray(previous_plan + splines @ found.x)
+    decided, last = np.split(previous_plan, [N_DECIDED])
+    found = solve(cost, bounds.of_change(last, splines), np.zeros(splines.shape[1]), 0, tolerance=tolerance)
+    return None if found is None else np.concatenate((decided, last + splines @ found.x))

@@ -99,15 +99,14 @@ class TwinCatSource(ArraysSource):
             places[name] = _Place(i, max(time for time in times if time < i))
         self.names = list(places)
         self.times = {name: clocks[place.time] for name, place in places.items() if place.field != place.time}
-        units = {
-            name: _cell(self._known.get(_UNIT, []), places[name].field).partition("(")[0].strip() for name in self.times
-        }
+        row_of_units, intervals = (self._known.get(key, []) for key in (_UNIT, _SAMPLE_TIME))
+        units = {name: _cell(row_of_units, places[name].field).partition("(")[0].strip() for name in self.times}
         stated = {name: unit for name, unit in units.items() if unit}  # of ``mm (Length)``; ``(None)`` states none
         self.units = {**stated, **dict.fromkeys(clocks.values(), "s")}
         self._intervals = {
             name: 1e-3 * float(text)
             for name in self.times
-            if is_number(text := decimal_points(_cell(self._known.get(_SAMPLE_TIME, []), places[name].field)))
+            if is_number(text := decimal_points(_cell(intervals, places[name].field)))
         }
         fastest = min(self._intervals.values(), default=0.0)
         self._slow = {self.times[name] for name, interval in self._intervals.items() if interval > fastest}

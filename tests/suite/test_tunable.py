@@ -45,10 +45,10 @@ def changed_run(stream: Stream, first: int = 0, last: int = N_RUN) -> Array:
 
 
 @cache
-def of_the_library(averaging: bool) -> Array:
+def of_the_library(run: Callable[[Stream], Array], **values: Value) -> Array:
     library = LookAheadStream(COMPENSATOR)
-    initialise(library, averaging=averaging, **LIMITS)
-    return changed_run(library)
+    initialise(library, **values, **LIMITS)
+    return run(library)
 
 
 def column(outputs: Array, name: str) -> Array:
@@ -65,7 +65,7 @@ def assert_limits(x_dm: Array) -> None:
 @compensators
 def test_changes_act_from_the_next_window_on_and_fade(new_stream: StreamMaker, averaging: bool) -> None:
     stream = new_stream.begun(averaging=averaging, **LIMITS)
-    outputs, expected = changed_run(stream), of_the_library(averaging)
+    outputs, expected = changed_run(stream), of_the_library(changed_run, averaging=averaging)
     x_dm, x_d, state = (column(outputs, name) for name in ("x_dm", "x_d", "sep_state"))
     np.testing.assert_allclose(x_dm, column(expected, "x_dm"), rtol=0, atol=TOLERANCE)
     assert state.tolist() == column(expected, "sep_state").tolist()
@@ -125,21 +125,16 @@ def test_a_value_out_of_range_is_refused_when_it_is_set(
     assert steps(stream, 50, 90) == steps(untroubled, 50, 90)
 
 
-def gap_run(stream: Stream, timeout: float) -> Array:
+def gap_run(stream: Stream) -> Array:
     """Step with measurements missing from 130 to 259."""
-    initialise(stream, measurement_timeout=timeout, **LIMITS)
     return stepped(stream, lambda k: {"x_meas": math.nan} if 130 <= k < 260 else {})
-
-
-@cache
-def gap_of_the_library(timeout: float) -> Array:
-    return gap_run(LookAheadStream(COMPENSATOR), timeout)
 
 
 @compensators
 @pytest.mark.parametrize("timeout", [0.05, 0.0])
 def test_the_change_fades_while_no_measurement_comes(new_stream: StreamMaker, timeout: float) -> None:
-    outputs, expected = gap_run(new_stream(), timeout), gap_of_the_library(timeout)
+    outputs = gap_run(new_stream.begun(measurement_timeout=timeout, **LIMITS))
+    expected = of_the_library(gap_run, measurement_timeout=timeout)
     x_dm, x_d, lost = (column(outputs, name) for name in ("x_dm", "x_d", "no_measurement"))
     first = slice(0, 280)  # after so long without a measurement, plans of the rest are more apart than the tolerance
     np.testing.assert_allclose(x_dm[first], column(expected, "x_dm")[first], rtol=0, atol=TOLERANCE)
@@ -174,17 +169,10 @@ def tripping_run(stream: Stream, first: int = 0, last: int = N_RUN, *, averaging
     return stepped(stream, setting, first, last)
 
 
-@cache
-def tripping_library() -> Array:
-    library = LookAheadStream(COMPENSATOR)
-    initialise(library, following_error_max=ALLOWED, **LIMITS)
-    return tripping_run(library)
-
-
 @compensators
 def test_a_trip_fades_and_ends_with_a_rising_reset(new_stream: StreamMaker) -> None:
     stream = new_stream.begun(following_error_max=ALLOWED, **LIMITS)
-    outputs, expected = tripping_run(stream), tripping_library()
+    outputs, expected = tripping_run(stream), of_the_library(tripping_run, following_error_max=ALLOWED)
     x_dm, x_d, state, alarm = (column(outputs, name) for name in ("x_dm", "x_d", "sep_state", "alarm"))
     # 50 mm beside the path rounding grows fivefold from window to window: measurements an ulp off give 2e-7
     np.testing.assert_allclose(x_dm, column(expected, "x_dm"), rtol=0, atol=1e-6)
@@ -206,16 +194,13 @@ def test_a_trip_fades_and_ends_with_a_rising_reset(new_stream: StreamMaker) -> N
 def test_what_is_measured_above_the_limit_and_until_the_reset_is_not_learned(new_stream: StreamMaker) -> None:
     seen = []
     for beside in (BEYOND, -10 * BEYOND):
+
+        def setting(k: int, beside: float = beside) -> dict[str, Value]:
+            measured: dict[str, Value] = {"x_meas": position(k * T_S) + beside} if 200 <= k < 290 else {}
+            return {**measured, "reset": k == 300}
+
         stream = new_stream.begun(following_error_max=ALLOWED, **LIMITS)
-        outputs = []
-        for k in range(N_RUN):
-            set_inputs(stream, k * T_S)
-            if 200 <= k < 290:
-                stream.set("x_meas", position(k * T_S) + beside)
-            stream.set("reset", k == 300)
-            stream.step(k * T_S, T_S)
-            outputs.append(stream.outputs())
-        seen.append(np.array(outputs))
+        seen.append(stepped(stream, setting))
         stream.close()
     for name in ("x_dm", "x_h", "x_h_std", "sep_state", "alarm"):
         np.testing.assert_array_equal(column(seen[0], name), column(seen[1], name))
