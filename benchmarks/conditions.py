@@ -159,11 +159,11 @@ def changed_plants(n: int, seed: int | None = None) -> Iterator[Case]:
     for name, factors in STAGE_CHANGES.items():
         yield _changed(name, stage, _scaled(stage.new_plant(), factors), spiral()[0])
     for drawn in random_drives(range(n), SEED if seed is None else seed):
-        modes = [
-            replace(mode, f_n=DETUNED * mode.f_n, alpha=DETUNED**2 * mode.alpha) for mode in drawn.true_model.modes
-        ]
-        x = simulate_many([ModalModel(modes)], [drawn.disturbances], [drawn.x_d])[0]
-        x_meas = x + drawn.noise_std * np.random.default_rng(drawn.index).standard_normal(len(x))
+        recipe = drawn.recipe
+        true = recipe.true.model.modes
+        modes = [replace(mode, f_n=DETUNED * mode.f_n, alpha=DETUNED**2 * mode.alpha) for mode in true]
+        x = simulate_many([ModalModel(modes)], [recipe.disturbances], [drawn.x_d])[0]
+        x_meas = x + recipe.noise_std * np.random.default_rng(drawn.index).standard_normal(len(x))
         name = f"drive {drawn.index}, frequencies × {DETUNED:g}"
         yield Case(name, drawn.model, PredictorSettings(), drawn.x_d, (drawn.x_meas, x_meas))
 

@@ -28,11 +28,6 @@ def test_every_exception_and_finding_is_explained() -> None:
 
 @pytest.mark.parametrize("words", [words for one in ERRORS.values() for words in one.printed])
 def test_words_of_messages_are_still_printed(words: str) -> None:
-    assert any(
-        words in without_breaks(path) for path in (ROOT / "hybridsep").rglob("*.py") if path.name != "messages.py"
-    )
-
-
-def without_breaks(path: Path) -> str:
-    """Return a file's text with adjacent string literals joined."""
-    return re.sub(r'"\s*\n\s*f?"', "", path.read_text(encoding="utf-8"))
+    paths = (path for path in (ROOT / "hybridsep").rglob("*.py") if path.name != "messages.py")
+    # With adjacent string literals joined
+    assert any(words in re.sub(r'"\s*\n\s*f?"', "", path.read_text(encoding="utf-8")) for path in paths)

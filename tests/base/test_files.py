@@ -3,7 +3,7 @@
 import os
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -110,20 +110,12 @@ def write_figure(path: Path) -> None:
     save_figure(figure, path)
 
 
-def write_state(path: Path) -> None:
-    HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)).save(path)
-
-
-def write_fmu(path: Path) -> None:
-    build_fmu(load_machine("spring_mass_damper"), path.stem, path.parent, "python")
-
-
-WRITERS = {
+WRITERS: dict[str, Callable[[Path], object]] = {
     "run.csv": write_table,
     "run.npz": write_table,
     "run.png": write_figure,
-    "trained.state": write_state,
-    "FeedDrivePy.fmu": write_fmu,
+    "trained.state": lambda path: HybridPredictor(ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)).save(path),
+    "FeedDrivePy.fmu": lambda path: build_fmu(load_machine("spring_mass_damper"), path.stem, path.parent, "python"),
 }
 
 

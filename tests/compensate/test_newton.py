@@ -52,11 +52,6 @@ def run(sep: SepCompensator, machine: Machine = STAGE, **more: object) -> Run:
 
 
 @cache
-def by_physics() -> Run:
-    return run(compensator(compensate="physics"))
-
-
-@cache
 def cold(period: float = 0.0) -> tuple[Run, bytes]:
     """Return the run of a compensator that learns the moves, and the compensator after it."""
     sep = compensator(predictor=replace(AVERAGED, period=period))
@@ -185,7 +180,7 @@ def test_without_anything_learned_the_physics_model_plans() -> None:
 
 @pytest.mark.slow
 def test_plans_follow_friction_that_follows_the_command() -> None:
-    physics, (first, sep) = by_physics(), cold()
+    physics, (first, sep) = run(compensator(compensate="physics")), cold()
     warm = run(SepCompensator.from_bytes(sep), t_init=0.0)
     assert warm.state.max() == SepState.HYBRID
     assert first.tracking_rms < 0.6 * physics.tracking_rms

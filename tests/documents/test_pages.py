@@ -136,13 +136,9 @@ def test_wires_end_at_ports() -> None:
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
-
-
 @pytest.mark.slow
 def test_the_two_commands_come_first_and_ci_runs_the_second() -> None:
-    first, second = (block.strip() for block in blocks("sh")[:2])
+    first, second = (block.strip() for block in re.findall(r"```sh\n(.*?)```", README, re.DOTALL)[:2])
     assert "\n" not in first + second
     assert first.endswith(".venv/bin/hybridsep demo --out demo")
     assert second in (ROOT / ".ci" / "run").read_text().splitlines()

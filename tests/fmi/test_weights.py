@@ -23,19 +23,14 @@ from hybridsep.predict.predictor import HybridPredictor
 MACHINE = paper_machine("spring_mass_damper")
 
 
-@pytest.fixture(scope="module")
-def trained() -> Path:
-    """The state of a predictor that has seen one staircase."""
-    return trained_state("HybridPredictor")
-
-
 def build(out: Path, weights: Path | None = None, model: str = "HybridPredictor") -> Path:
     return build_fmu(MACHINE, model, out, targets=("host",), weights=weights)
 
 
 @pytest.mark.slow
-def test_the_weights_are_in_the_resources_and_in_the_guid(tmp_path: Path, trained: Path) -> None:
+def test_the_weights_are_in_the_resources_and_in_the_guid(tmp_path: Path) -> None:
     """Of the Python flavour: test_python_fmu.py."""
+    trained = trained_state(PREDICTOR)
     paths = [build(tmp_path / str(i), weights) for i, weights in enumerate((trained, trained, None))]
     assert paths[0].read_bytes() == paths[1].read_bytes()
     with zipfile.ZipFile(paths[0]) as archive:
@@ -56,9 +51,9 @@ def test_a_state_of_other_parameters_is_refused_by_name(tmp_path: Path) -> None:
     assert f"was not trained for machine spring_mass_damper: it has {differing} instead of zoh; " in str(caught.value)
 
 
-def test_a_state_of_another_machine_is_refused_by_name(trained: Path, tmp_path: Path) -> None:
+def test_a_state_of_another_machine_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(StateError, match=r"mode\[1\].f_n = .* instead of .*mode\[2\].f_n = none instead of "):
-        build_fmu(load_machine("als25010_x"), "HybridPredictor_als25010_x", tmp_path, weights=trained)
+        build_fmu(load_machine("als25010_x"), "HybridPredictor_als25010_x", tmp_path, weights=trained_state(PREDICTOR))
 
 
 def test_an_empty_state_is_refused(tmp_path: Path) -> None:
@@ -68,11 +63,11 @@ def test_an_empty_state_is_refused(tmp_path: Path) -> None:
         build(tmp_path, empty)
 
 
-def test_weights_and_samples_have_one_model_each(tmp_path: Path, trained: Path) -> None:
+def test_weights_and_samples_have_one_model_each(tmp_path: Path) -> None:
     with pytest.raises(
         FmuError, match="weights are for a HybridPredictor or a SepCompensator, FeedDrive is a FeedDrive"
     ):
-        build(tmp_path, trained, "FeedDrive")
+        build(tmp_path, trained_state(PREDICTOR), "FeedDrive")
     with pytest.raises(FmuError, match="samples are for a ReferenceTrajectory, FeedDrive is a FeedDrive"):
         build_fmu(MACHINE, "FeedDrive", tmp_path, samples=[0.0])
 

@@ -305,8 +305,7 @@ def test_another_origin_moves_out_at_once(folder: Path, model: str, before: int)
 
 def test_a_jump_of_one_of_them_is_no_origin(folder: Path) -> None:
     run = Run(Component(load_machine(X, PREVIEW), folder))
-    run.stay(100)
-    run.stay(50)
+    run.stay(150)
     run.origin = 5.0
     shown = [run.step(0.0) for _ in range(100)]
     assert max(abs(one[OUT]) for one in shown) < 1.0

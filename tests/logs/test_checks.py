@@ -297,17 +297,15 @@ def test_a_shift_is_offered_where_the_measured_column_is_the_noisier_one() -> No
 # What is noted
 
 
-def held(x: Array) -> Array:
-    return np.where((np.arange(len(x)) >= 950) & (np.arange(len(x)) < 1010), x[950], x)
-
-
 NOTES: dict[str, Callable[[Log], Log]] = {
     "missing samples": lambda log: replace(log, x_meas=np.where(np.arange(len(log.t)) == 700, np.nan, log.x_meas)),
     "rate": lambda log: replace(log, t=log.t + 0.1 * log.T_s * np.sin(np.arange(len(log.t)))),
     "offset": lambda log: replace(log, x_meas=log.x_meas + 0.02 * np.ptp(log.x_d)),
     "late": lambda log: replace(log, x_meas=np.concatenate((np.zeros(400), log.x_meas[:-400]))),
     "start in motion": lambda log: log_of(log.x_d[1200:] - log.x_d[1200], log.x_meas[1200:] - log.x_d[1200], log.T_s),
-    "stuck samples": lambda log: replace(log, x_meas=held(log.x_meas)),
+    "stuck samples": lambda log: replace(
+        log, x_meas=np.r_[log.x_meas[:950], 60 * [log.x_meas[950]], log.x_meas[1010:]]
+    ),
     "outliers": lambda log: replace(log, x_meas=log.x_meas + 0.1 * (np.arange(len(log.t)) == 500)),
     "clipped": lambda log: replace(log, x_meas=np.minimum(log.x_meas, 0.8 * float(log.x_meas.max()))),
 }

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -123,18 +123,14 @@ def test_an_export_without_times(tmp_path: Path) -> None:
 # Rates that differ
 
 
-def two_rates(path: Path, kind: str) -> Path:
-    """Write a command at 1 kHz, and a position at 500 Hz, of a trace from its second sample on."""
+@pytest.mark.parametrize(("kind", "skipped"), [("twincat", 0), ("sinumerik", 2)])
+def test_rates_that_differ(tmp_path: Path, kind: str, skipped: int) -> None:
+    """A command at 1 kHz, and a position at 500 Hz, of a trace from its second sample on."""
+    path, unit = tmp_path / "log", "m" if kind == "sinumerik" else None
     if kind == "twincat":
         path.write_text(twincat_csv({"x_d": (1e-3, X_D), "x": (2e-3, X[::2])}))
     else:
         path.write_text(trace_xml({"CmdPos [u1, 1]": (0.0, 1e-3, X_D), "ActPos [u1, 1]": (2e-3, 2e-3, X[2::2])}))
-    return path
-
-
-@pytest.mark.parametrize(("kind", "skipped"), [("twincat", 0), ("sinumerik", 2)])
-def test_rates_that_differ(tmp_path: Path, kind: str, skipped: int) -> None:
-    path, unit = two_rates(tmp_path / "log", kind), "m" if kind == "sinumerik" else None
     message = r"sampled at different times: '.*' has 400 samples every 0\.001 s, '.*' has \d+ .* every 0\.002 s"
     refused(message, path, unit=unit)
     log = read_log(path, unit=unit, resample=True)
@@ -264,25 +260,26 @@ def test_capture(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_log(path, columns={"x": "DES_POS|4"}).x_meas, log.x_d)
 
 
-def signals_of(content: dict[str, Any]) -> list[dict[str, Any]]:
-    return cast(list[dict[str, Any]], content["Header"]["SignalListHFData"])
-
-
-def rows_of(content: dict[str, Any], block: int) -> list[Any]:
-    return cast(list[Any], content["Payload"][block]["HFData"])
-
-
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
         (lambda c: c["Header"].update(CycleTimeMs=0), "time 't' must increase, it never does"),
         (lambda c: c["Header"].update(SignalListHFData=7), "must have Header.CycleTimeMs, the Name and Axis of each"),
-        (lambda c: signals_of(c)[2].pop("Axis"), "the Name and Axis of each .*: KeyError: 'Axis'"),
-        (lambda c: rows_of(c, 0).insert(3, [1.0]), "rows of as many numbers in each HFData of Payload: ValueError"),
-        (lambda c: rows_of(c, 3)[4].__setitem__(1, "a"), "ValueError: could not convert string to float: 'a'"),
+        (lambda c: c["Header"]["SignalListHFData"][2].pop("Axis"), "the Name and Axis of each .*: KeyError: 'Axis'"),
+        (
+            lambda c: c["Payload"][0]["HFData"].insert(3, [1.0]),
+            "rows of as many numbers in each HFData of Payload: ValueError",
+        ),
+        (
+            lambda c: c["Payload"][3]["HFData"][4].__setitem__(1, "a"),
+            "ValueError: could not convert string to float: 'a'",
+        ),
         (lambda c: c["Payload"][3].update(HFData=None), "each HFData of Payload: TypeError"),
-        (lambda c: rows_of(c, 0)[0].__setitem__(0, 10**400), "each HFData of Payload: OverflowError"),
-        (lambda c: rows_of(c, 0)[1].__setitem__(3, math.nan), r"sample 2 .* 'DES_POS\|4' must be finite, got nan"),
+        (lambda c: c["Payload"][0]["HFData"][0].__setitem__(0, 10**400), "each HFData of Payload: OverflowError"),
+        (
+            lambda c: c["Payload"][0]["HFData"][1].__setitem__(3, math.nan),
+            r"sample 2 .* 'DES_POS\|4' must be finite, got nan",
+        ),
     ],
 )
 def test_refused_captures(tmp_path: Path, spoil: Callable[[dict[str, Any]], object], message: str) -> None:

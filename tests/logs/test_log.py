@@ -177,7 +177,7 @@ X_D = np.cumsum(np.sin(np.arange(N) / 50.0)) * 1e-5
 X = np.concatenate((np.zeros(6), X_D[:-6])) + 1e-9 * np.arange(N) ** 0.5
 
 
-def read(folder: Path, t: Any, *, x: Array = X, name: str = "t", **how: float) -> Log:
+def read(folder: Path, t: Any, *, x: Array = X, name: str = "t", **how: float | None) -> Log:
     return read_log(write(folder / "log.npz", {name: t, "x_d": X_D[: len(t)], "x": x[: len(t)]}), **how)  # type: ignore[arg-type]
 
 
@@ -207,10 +207,16 @@ def test_a_wrap_is_unwrapped(tmp_path: Path, unit: str, T_s: float, period: floa
     assert log.remarks == (f"the time wraps once, {words}: unwrapped",)
 
 
-def test_a_clock_that_is_set_back_an_hour(tmp_path: Path) -> None:
-    t = 7200.0 + 1e-3 * np.arange(N)
-    t[400:] -= 3600.0
-    assert read(tmp_path, t).starts == (0, 400)
+@pytest.mark.parametrize(
+    ("t", "by", "T_s"),
+    [
+        (7200.0 + 1e-3 * np.arange(N), -3600.0, None),  # a clock that is set back an hour
+        (np.arange(N) // 10 * 0.01, 5.0, 1e-3),  # a long gap in rounded times
+        (1e-3 * np.arange(N), 1.2e-3, None),  # half a row
+    ],
+)
+def test_a_jump_of_the_time_begins_a_segment(tmp_path: Path, t: Array, by: float, T_s: float | None) -> None:
+    assert read(tmp_path, t + by * (np.arange(N) >= 350), T_s=T_s).starts == (0, 350)
 
 
 def test_rows_that_are_written_twice_are_left_out(tmp_path: Path) -> None:
@@ -259,12 +265,6 @@ def test_what_times_do_not_tell_is_asked_for(tmp_path: Path, t: Array, T_s: floa
     log = read(tmp_path, t, T_s=T_s)
     assert (log.T_s, log.starts) == (T_s, (0,))
     np.testing.assert_array_equal(log.x_meas, X)
-
-
-def test_a_long_gap_is_seen_in_rounded_times(tmp_path: Path) -> None:
-    t = np.arange(N) // 10 * 0.01
-    t[350:] += 5.0
-    assert read(tmp_path, t, T_s=1e-3).starts == (0, 350)
 
 
 @pytest.mark.parametrize("period", [2, 7])
@@ -317,15 +317,12 @@ def test_where_a_command_rests_it_rests_in_rows_that_were_lost(tmp_path: Path) -
 
 
 def test_how_many_rows_are_lost_must_be_told(tmp_path: Path) -> None:
-    """By a clock that jitters as well; but half a row is none, and another segment begins."""
+    """By a clock that jitters as well."""
     keep = np.delete(np.arange(N), np.arange(50, 550, 20))
     jitter = np.random.default_rng(0).uniform(-2e-4, 2e-4, len(keep))
     log = read_log(write(tmp_path / "log.npz", {"t": 1e-3 * keep + jitter, "x_d": X_D[keep], "x": X[keep]}))
     assert (log.starts, len(log.t), np.isnan(log.x_meas).sum()) == ((0,), N, 25)
     assert log.remarks[0].startswith("25 samples are missing in 25 gaps")
-    t = 1e-3 * np.arange(N)
-    t[300:] += 1.2e-3
-    assert read(tmp_path, t).starts == (0, 300)
 
 
 def test_commands_alone_may_be_held(tmp_path: Path) -> None:

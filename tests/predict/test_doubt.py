@@ -111,7 +111,7 @@ def test_the_commands_expert_is_doubted_where_it_led() -> None:
     modes = [replace(mode, f_n=0.9 * mode.f_n, alpha=0.81 * mode.alpha) for mode in model.modes]
     before, x = simulate([model, ModalModel(modes)], 2 * [recipe.disturbances], 2 * [recipe.x_d])
     drive = recipe.drive(before)
-    x_meas = x + drive.noise_std * np.random.default_rng(35).standard_normal(len(x))
+    x_meas = x + recipe.noise_std * np.random.default_rng(35).standard_normal(len(x))
     warm = HybridPredictor(drive.model)
     run(warm, drive.x_d, drive.x_meas)
     warm.restart()

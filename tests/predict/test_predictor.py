@@ -30,33 +30,33 @@ NUMERATOR, DENOMINATOR = np.array([staircase.C, staircase.K]), np.array([stairca
 PAPER: dict[str, Any] = {"T_s": 1e-3, "Np": 100, "p": 50, "q": 3, "lam": 1e-12, "t_init": 0.3}
 
 
-class TestStaircase:
-    @pytest.mark.slow
-    def test_equals_the_oracle(self) -> None:
-        x_d, x = staircase.commanded(), staircase.measured(0)
-        x_pb, x_h, active = replay(HybridPredictor(MODEL, PredictorSettings(**PAPER, averaging=False)), x_d, x)
-        slow = oracle.run(NUMERATOR, DENOMINATOR, x_d, x, **PAPER)
-        np.testing.assert_allclose(x_pb, slow.x_pb, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(x_h, slow.x_h, rtol=0, atol=1e-12)
-        np.testing.assert_array_equal(active, slow.active)
-        assert active.sum() == 6001 - 300
+@pytest.mark.slow
+def test_the_staircase_equals_the_oracle() -> None:
+    x_d, x = staircase.commanded(), staircase.measured(0)
+    x_pb, x_h, active = replay(HybridPredictor(MODEL, PredictorSettings(**PAPER, averaging=False)), x_d, x)
+    slow = oracle.run(NUMERATOR, DENOMINATOR, x_d, x, **PAPER)
+    np.testing.assert_allclose(x_pb, slow.x_pb, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(x_h, slow.x_h, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(active, slow.active)
+    assert active.sum() == 6001 - 300
 
-    def test_figures_of_the_paper_and_of_a_warm_start(self) -> None:
-        x_d = staircase.commanded()
-        physics, cold, warm = [], [], []
-        for seed in range(10):
-            predictor = HybridPredictor(MODEL, PredictorSettings(**PAPER, averaging=False))
-            x = staircase.measured(seed)
-            x_pb, x_h, _ = replay(predictor, x_d, x)
-            physics.append(rms(x - x_pb))
-            cold.append(rms(x - x_h))
-            predictor.restart()
-            x = staircase.measured(100 + seed)
-            warm.append(rms(x - replay(predictor, x_d, x)[1]))
-        # µm, RMS against the measured position, mean of ten noise seeds; the paper prints 33.7 and 14.7.
-        assert 1e6 * np.mean(physics) == pytest.approx(33.94, abs=0.1)
-        assert 1e6 * np.mean(cold) == pytest.approx(14.90, abs=0.2)
-        assert 1e6 * np.mean(warm) == pytest.approx(8.95, abs=0.2)
+
+def test_figures_of_the_paper_and_of_a_warm_start() -> None:
+    x_d = staircase.commanded()
+    physics, cold, warm = [], [], []
+    for seed in range(10):
+        predictor = HybridPredictor(MODEL, PredictorSettings(**PAPER, averaging=False))
+        x = staircase.measured(seed)
+        x_pb, x_h, _ = replay(predictor, x_d, x)
+        physics.append(rms(x - x_pb))
+        cold.append(rms(x - x_h))
+        predictor.restart()
+        x = staircase.measured(100 + seed)
+        warm.append(rms(x - replay(predictor, x_d, x)[1]))
+    # µm, RMS against the measured position, mean of ten noise seeds; the paper prints 33.7 and 14.7.
+    assert 1e6 * np.mean(physics) == pytest.approx(33.94, abs=0.1)
+    assert 1e6 * np.mean(cold) == pytest.approx(14.90, abs=0.2)
+    assert 1e6 * np.mean(warm) == pytest.approx(8.95, abs=0.2)
 
 
 @pytest.mark.parametrize("hold", ["zoh", "foh"])

@@ -32,12 +32,12 @@ CUT = 1060  # sample of the staircase in the middle of a move, at 80 mm/s
 
 
 @cache
-def moved(model: str) -> tuple[Array, Array]:
-    """Return commanded and measured positions of the model's plant over the staircase, (n,), m."""
-    machine, x_d = machine_of(model), commanded()[:3300]
+def moved(model: str, n: int = 3300, noise_std: float | None = None, seed: int = 3) -> tuple[Array, Array]:
+    """Return commanded and measured positions of the model's plant over the staircase, (n,), m, with its own noise."""
+    machine, x_d = machine_of(model), commanded()[:n]
     assert machine.plant is not None
-    x = simulate(machine.new_plant(), x_d, T_S)
-    return x_d, Encoder(machine.plant.noise_std, 3).measure_all(x)
+    encoder = Encoder(machine.plant.noise_std if noise_std is None else noise_std, seed)
+    return x_d, encoder.measure_all(simulate(machine.new_plant(), x_d, T_S))
 
 
 def late(model: str, Np: int, delay: int, n: int = 1500) -> tuple[Array, Array]:
@@ -142,10 +142,9 @@ def test_a_rejected_measurement_is_within_the_interval(new_stream: StreamMaker) 
 @cache
 def growing(model: str) -> tuple[Array, Array]:
     """Return the inputs of a look-ahead on a plant that rings, and whose motion grows from next to nothing, (n,), m."""
-    machine, k = machine_of(model), np.arange(3300.0)
-    assert machine.plant is not None
+    k = np.arange(3300.0)
     x_d = 1e-3 * (np.maximum(k - 300.0, 0.0) / 3000.0) ** 2 * np.sin(2.0 * np.pi * 2e-3 * (k - 300.0))
-    x = simulate(machine.new_plant(), x_d, T_S) + 4e-6 * np.sin(2.0 * np.pi * 0.03 * k) * (k > 200.0)
+    x = simulate(machine_of(model).new_plant(), x_d, T_S) + 4e-6 * np.sin(2.0 * np.pi * 0.03 * k) * (k > 200.0)
     return np.append(x_d[100:], np.full(100, x_d[-1])), Encoder(1e-7, 5).measure_all(x)
 
 
@@ -187,17 +186,9 @@ MISSING: dict[str, Indices] = {
 
 
 @cache
-def complete() -> tuple[Array, Array]:
-    """Return commands and complete positions of the paper's drive, (N,), m."""
-    machine, x_d = machine_of(PREDICTOR), commanded()[:N]
-    assert machine.plant is not None
-    return x_d, Encoder(1e-7, 5).measure_all(simulate(machine.new_plant(), x_d, T_S))
-
-
-@cache
 def error_without(name: str) -> float:
     """Return the RMS error of the library's predictions without some measurements, m."""
-    x_d, x = complete()
+    x_d, x = moved(PREDICTOR, N, 1e-7, 5)
     given = x.copy()
     given[MISSING[name]] = np.nan
     values: dict[str, Value] = {"averaging": True, "Np": NP, "p": NP, "t_init": 0.0, "x_meas": x_d[0]}

@@ -182,9 +182,8 @@ N, FIRST = 1400, 1060
 
 def disturbed(model: str, delay: int, *, missing: bool) -> tuple[Array, Array]:
     """Return commands and late measurements that stand, change their level, and are missing for a while, (n,), m."""
-    machine, x_d = machine_of(model), commanded()[: FIRST + N]
-    assert machine.plant is not None
-    x = Encoder(1e-7, 5).measure_all(simulate(machine.new_plant(), x_d, TS))
+    x_d = commanded()[: FIRST + N]
+    x = Encoder(1e-7, 5).measure_all(simulate(machine_of(model).new_plant(), x_d, TS))
     x_d, x = x_d[FIRST:].copy(), np.concatenate((np.full(delay, x[FIRST]), x))[FIRST : FIRST + N].copy()
     x[250:590] = x[250]  # the axis stands while the command moves
     x[700:] += 3e-4  # the level changes, which is not believed at first

@@ -43,10 +43,10 @@ STAGES = (STAGE, STAGE_PREDICTOR, STAGE_COMPENSATOR)
 """Models of the stage's X drive, which differ from the default machine's in modes and settings."""
 
 
-def _refusing(kind: type[Exception], function: Callable[..., Any], *arguments: Any, **keywords: Any) -> None:
-    """Call a function whose refusal is an error of its own."""
+def _refusing(kind: type[Exception], function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
+    """Call a function whose refusal is an error of its own; return what it does."""
     try:
-        function(*arguments, **keywords)
+        return function(*arguments, **keywords)
     except kind as error:
         raise RefusedStreamError(str(error)) from error
 
@@ -134,9 +134,7 @@ class FmuStream:
 
     def outputs_before(self, values: Mapping[str, Value]) -> list[float]:
         _refusing(FmuError, self._fmu.begin, values)
-        shown: list[float] = []
-        _refusing(FmuError, lambda: shown.extend(self.outputs()))
-        return shown
+        return list(_refusing(FmuError, self.outputs))
 
     def set(self, name: str, value: Value) -> None:
         _refusing(FmuError, self._fmu.set, name, value)

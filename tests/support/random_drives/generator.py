@@ -105,15 +105,6 @@ CHUNK = 125  # drives simulated at once: their states stay in the processor's ca
 
 
 @dataclass(frozen=True)
-class RandomDrive(Drive):
-    """A drive of modes."""
-
-    true_model: ModalModel  # the drive's linear part; ``model`` is up to 20 % wrong
-    disturbances: Disturbances
-    noise_std: float  # m: of the encoder
-
-
-@dataclass(frozen=True)
 class Recipe:
     """Everything random about a drive."""
 
@@ -140,23 +131,19 @@ class Recipe:
         noise = noise_std * draws.normal(len(x_d))
         return cls(index, kind, x_d, true, nominal, disturbances, noise_std, quantum, noise)
 
-    def drive(self, x: Array) -> RandomDrive:
+    def drive(self, x: Array) -> "RandomDrive":
         """Return the drive with its true positions, ``(n,)``, m."""
         x_meas = x + self.noise
         if self.quantum:
             x_meas = self.quantum * np.rint(x_meas / self.quantum)
-        return RandomDrive(
-            index=self.index,
-            x_d=self.x_d,
-            x=x,
-            x_meas=x_meas,
-            model=self.nominal.model,
-            settings=PredictorSettings(),
-            true_model=self.true.model,
-            kind=self.kind,
-            disturbances=self.disturbances,
-            noise_std=self.noise_std,
-        )
+        return RandomDrive(self.index, self.kind, self.x_d, x, x_meas, self.nominal.model, PredictorSettings(), self)
+
+
+@dataclass(frozen=True)
+class RandomDrive(Drive):
+    """A drive of modes, whose ``model`` is up to 20 % wrong."""
+
+    recipe: Recipe
 
 
 def true_positions(indices: Sequence[int], seed: int = SEED) -> list[Array]:
