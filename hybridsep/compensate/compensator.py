@@ -177,7 +177,7 @@ class SepCompensator:
         loads = np.zeros(self.preview) if load is None else as_samples(load, "load", self.preview)
         predictor, Np = self.predictor, self.predictor.Np
         if predictor.start is None:  # at rest where the first command is
-            predictor.rest_at(float(command[0]))
+            predictor.state = replace(predictor.state, start=float(command[0]))
         if np.isnan(self._x_d_before[0]):
             self._x_d_before[:] = predictor.start
         more = np.arange(1, self.horizon - self.preview + 1)

@@ -163,16 +163,12 @@ class PlanModel:
             if expert.like(self._model).target == COMMAND_RESIDUAL:
                 # As late as the command's expert takes them
                 acted = np.pad(changes, ((self._model.command.dead_time, 0), (0, 0)))[: len(changes)]
-                total += shrinkage * self._of_command(one, acted) + weight * (acted - passed)
+                increments = np.diff(acted, axis=0, prepend=0.0)
+                drive = lfilter(one.solution.weights[1 : one.n_static], [1.0], increments, axis=0)
+                total += shrinkage * _recur(one, drive) + weight * (acted - passed)
             else:
                 total += shrinkage * self._of_disturbances(one, slopes, changes, passed)
         return total
-
-    def _of_command(self, solved: SolvedExpert, acted: Array) -> Array:
-        """Return the change of the command's residual with such late changes of the commands, ``(n, m)``."""
-        increments = np.diff(acted, axis=0, prepend=0.0)
-        drive = lfilter(solved.solution.weights[1 : solved.n_static], [1.0], increments, axis=0)
-        return _recur(solved, drive)
 
     def _of_disturbances(self, solved: SolvedExpert, slopes: DisturbanceSlopes, changes: Array, passed: Array) -> Array:
         """Return the change of the physics model's residual by an expert with static features, ``(n, m)``."""

@@ -76,15 +76,12 @@ class Stop:
             tried = 0.5 * (length + too_long)
         shared = old[:n] + length * (plan[:n] - old[:n])
         stop = self._stopping @ shared + share * (old - self._stopping @ old[:n])
-        return (plan if length == 1.0 else self._fading(shared, len(plan))), stop
-
-    def _fading(self, shared: Array, n: int) -> Array:
-        """Return a plan that goes on behind shared coefficients by letting the change fade."""
-        pole = math.exp(-_FADE * self.spacing / self._horizon)
-        c = [*shared.tolist()]
-        while len(c) < n:
+        if length == 1.0:
+            return plan, stop
+        pole, c = math.exp(-_FADE * self.spacing / self._horizon), shared.tolist()
+        while len(c) < len(plan):  # behind what is shared the change fades
             c.append(3.0 * pole * c[-1] - 3.0 * pole * pole * c[-2] + pole * pole * pole * c[-3])
-        return np.array(c)
+        return np.array(c), stop
 
 
 def _share(rows: Array, own: Array, low: Array, high: Array) -> float | None:

@@ -92,7 +92,10 @@ class _Piece:
         self.v_d = np.diff(self.u, prepend=0.0) / discrete.T_s
         self.path = discrete.forced_response(discrete.rest(), self.u)[0]
         n, n_train = np.arange(len(x_d)), recording.n_train
-        known = ~np.isnan(x) & (n >= min(_memory(discrete), n_train // 4))
+        # The model has forgotten then how it began
+        slowest = float(np.abs(np.linalg.eigvals(discrete.A)).max(initial=0.0))
+        settles = math.ceil(math.log(_SETTLED) / math.log(slowest)) if 0.0 < slowest < 1.0 else 0
+        known = ~np.isnan(x) & (n >= min(discrete.dead_time + settles, n_train // 4))
         self.fitted = known & (n < _FITTED * n_train)
         self.choosing = known & (n >= _FITTED * n_train) & (n < n_train)
         self.judging = known & (n >= recording.judges_from)
@@ -151,12 +154,6 @@ def commands_to_try(recordings: Sequence[Recording]) -> Array:
     share = np.arange(n, 0, -1) / n  # of the way to the first sample, backwards
     steps = first * share**2 * (3.0 - 2.0 * share)
     return np.concatenate((found[0] - np.cumsum(steps)[::-1], found))
-
-
-def _memory(discrete: DiscreteModel) -> int:
-    """Return after how many samples the model has forgotten how it began."""
-    slowest = float(np.abs(np.linalg.eigvals(discrete.A)).max(initial=0.0))
-    return discrete.dead_time + (math.ceil(math.log(_SETTLED) / math.log(slowest)) if 0.0 < slowest < 1.0 else 0)
 
 
 def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_Piece]) -> list[_Disturbed]:

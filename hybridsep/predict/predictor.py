@@ -130,10 +130,6 @@ class HybridPredictor:
         self.planned = True
         self.state = replace(self.state, residual=self.residual.plan_ahead())
 
-    def rest_at(self, start: float) -> None:
-        """Begin the run at ``start``, m, as soon as it is known."""
-        self.state = replace(self.state, start=start)
-
     def take_over(self, learned: Any, uncertainty: Uncertainty, regressions: tuple[RidgeRegression, ...]) -> None:
         """Take over what another predictor with the same settings has learned; :meth:`restart` then begins a run."""
         residual = self.residual.take_over(learned, regressions)
