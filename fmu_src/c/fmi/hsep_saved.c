@@ -8,7 +8,6 @@
  */
 #include "hsep_calls.h"
 
-#include "hsep_check.h"
 #include "hsep_crc.h"
 
 #include <string.h>

@@ -1,6 +1,5 @@
 /* FMI 2.0 for co-simulation. A value reference is the place of one value; every number comes from the model. */
 #include "hsep_calls.h" /* before the importer's header: it names FMI2_FUNCTION_PREFIX */
-#include "hsep_check.h"
 
 #include "fmi2Functions.h"
 

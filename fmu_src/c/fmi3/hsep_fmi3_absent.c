@@ -1,6 +1,5 @@
-/* What modelDescription.xml says is absent: clocks, events, derivatives, dependencies of single elements, and
- * the other kinds of FMUs. The functions are there, since importers look them all up; they are refused in every state.
- */
+/* What modelDescription.xml says is absent: clocks, events, derivatives, dependencies of single elements, and the other
+ * kinds of FMUs. The functions are there, since importers look them all up; they are refused in every state. */
 #include "hsep_calls.h" /* before the importer's header: it names FMI3_FUNCTION_PREFIX */
 
 #include "fmi3Functions.h"

@@ -274,8 +274,7 @@ HSEP_API void hsep_interior_begin(
     slacks_begin(&a.slacks, self->cost);
 }
 
-/* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its
- * terms. */
+/* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its terms. */
 static hsep_real interior_dual_residual(const interior_arrays *a, const hsep_real *P)
 {
     hsep_real residual = 0.0, largest = 0.0;

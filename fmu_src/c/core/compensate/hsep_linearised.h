@@ -66,9 +66,8 @@ HSEP_API void hsep_linearised_at(
     hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach);
 
 /* Changes of x_h, m, by that change of the commands where it begins at the samples first + c spacing of the preview, c
- * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). Cost: HSEP_PHYSICS_ABREAST
- * (9 n_modes + p + 21) multiply-adds a sample for each expert that predicts the residual of the physics model, and
- * counts. */
+ * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). Cost: HSEP_PHYSICS_ABREAST (9 n_modes
+ * + p + 21) multiply-adds a sample for each expert that predicts the residual of the physics model, and counts. */
 HSEP_API void hsep_linearised_columns(
     hsep_linearised *self, hsep_averaged *model, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST]);

@@ -1,9 +1,8 @@
 /* Nonlinear feed drives, eq. (13), and a stage with friction and cable stiffness; and their position sensor.
  *
- * The command is held over a step; states are relative to the initial position. Classical
- * Runge-Kutta of order 4 in internal steps of at most 0.1 ms and 1/16 of the linear part's fastest time constant;
- * the command is never differentiated.
- * Cost of a step: 4 slopes for each internal step. Plain data; reentrant; allocates nothing.
+ * The command is held over a step; states are relative to the initial position. Classical Runge-Kutta of order 4 in
+ * internal steps of at most 0.1 ms and 1/16 of the linear part's fastest time constant; the command is never
+ * differentiated. Cost of a step: 4 slopes for each internal step. Plain data; reentrant; allocates nothing.
  */
 #ifndef HSEP_PLANT_H
 #define HSEP_PLANT_H

@@ -36,9 +36,8 @@ HSEP_API void hsep_regression_init(hsep_regression *self, hsep_int n, hsep_real 
 /* Where the next row goes, (n + 1,): phi, then its target. */
 HSEP_API hsep_real *hsep_regression_row(hsep_regression *self);
 
-/* Fold that row into the factor; the row's memory is used up. All n + 1 entries must be finite.
- * Cost: n^2 / 2 times 2 multiplications and 5 additions, and 2 n divisions, no matter how many rows were there
- * before. */
+/* Fold that row into the factor; the row's memory is used up. All n + 1 entries must be finite. Cost: n^2 / 2 times 2
+ * multiplications and 5 additions, and 2 n divisions, no matter how many rows were there before. */
 HSEP_API void hsep_regression_fold(hsep_regression *self);
 
 /* Solve R w = z for w, (n,). Cost: n^2 / 2 multiply-adds. */

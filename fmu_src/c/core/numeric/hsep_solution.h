@@ -72,9 +72,8 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
  * are to come. */
 HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come);
 
-/* Take in four rows that wait, or factor some of the head, until an amount of multiply-adds is spent, and return
- * what is left of it; the last part may exceed it by up to 4 (n + 1)^2. With all everything is done, whatever the
- * amount. */
+/* Take in four rows that wait, or factor some of the head, until an amount of multiply-adds is spent, and return what
+ * is left of it; the last part may exceed it by up to 4 (n + 1)^2. With all everything is done, whatever the amount. */
 HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all);
 
 /* Solve for the weights; penalties: > 0, of all features, are in the block. Return the sum of the squares of the

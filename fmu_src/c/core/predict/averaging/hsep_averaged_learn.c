@@ -193,23 +193,7 @@ static void averaged_bridge(const hsep_averaged *self, hsep_real e[], hsep_int b
     }
 }
 
-/* Take in sample k, which is believed, and the samples since the last believed one. fold: whether it is learned. */
-static void averaged_believe(
-    hsep_averaged *self, hsep_int k, const hsep_real x_pb[], hsep_real e[], hsep_real measured, int fold)
-{
-    const hsep_int j = self->Np - 1 - k;
-    e[j] = measured;
-    averaged_bridge(self, e, j + 1);
-    averaged_take_rows(self, x_pb, e, k + 1);
-    if (fold) {
-        const hsep_command *command = hsep_averaged_command(self);
-        averaged_fold(self, HSEP_MODEL_RESIDUAL, k, hsep_at(self, self->rows), e);
-        averaged_fold(self, HSEP_COMMAND_RESIDUAL, k, hsep_at_const(command, command->rows), hsep_at(self, self->e_0));
-    }
-    self->n_accepted += 1.0;
-}
-
-/* Judge the next sample, and take it in if it is believed. */
+/* Judge the next sample; if it is believed, take it in with those since the last believed one. fold: learn it too. */
 static void averaged_follow_sample(hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], int fold)
 {
     const hsep_int k = self->followed++, j = self->Np - 1 - k;
@@ -217,7 +201,15 @@ static void averaged_follow_sample(hsep_averaged *self, const hsep_real x_pb[], 
     const int accepted = hsep_gate_judge(&self->reach, measured, self->T_s);
     hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
     if (accepted) {
-        averaged_believe(self, k, x_pb, e, measured, fold);
+        e[j] = measured;
+        averaged_bridge(self, e, j + 1);
+        averaged_take_rows(self, x_pb, e, k + 1);
+        self->n_accepted += 1.0;
+    }
+    if (accepted && fold) {
+        const hsep_command *command = hsep_averaged_command(self);
+        averaged_fold(self, HSEP_MODEL_RESIDUAL, k, hsep_at(self, self->rows), e);
+        averaged_fold(self, HSEP_COMMAND_RESIDUAL, k, hsep_at_const(command, command->rows), hsep_at(self, self->e_0));
     }
     if (fold && self->followed == self->early) {
         averaged_prepare(self, e);
