@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from stream import STAGE
 
-from hybridsep import Encoder, ModalModel, Mode, load_machine, simulate
+from hybridsep import Encoder, ModalModel, Mode, Plant, load_machine, simulate
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.signals import Array
@@ -109,14 +109,14 @@ def test_the_motion_is_integrated_to_a_nanometre() -> None:
 
 
 def test_without_nonlinearity_the_plants_are_their_models() -> None:
-    """Fast modes are resolved, too."""
     modal = ModalModel([Mode(40.0, 0.3, 9e4, 5.0), Mode(90.0, 0.05, -2e4, 1.0)])
     fast = [ModalModel([Mode(f_n, 0.05, (2 * math.pi * f_n) ** 2)]) for f_n in (500.0, 5000.0)]
-    for model, plant, n, atol in (
+    cases: list[tuple[ModalModel, Plant, int, float]] = [
         (ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), FeedDrive(1.0, 15.7, 24674.0), 1500, 1e-10),
         (modal, StageDrive(modal), 1500, 1e-10),
-        *((one, StageDrive(one), 100, 1e-9) for one in fast),
-    ):
+        *((one, StageDrive(one), 100, 1e-9) for one in fast),  # fast modes are resolved, too
+    ]
+    for model, plant, n, atol in cases:
         discrete, x_d = model.discretise(TS), staircase()[:n]
         x_pb, _ = discrete.forced_response(discrete.rest(), x_d)
         np.testing.assert_allclose(simulate(plant, x_d, TS), x_pb, rtol=0, atol=atol)
