@@ -240,10 +240,12 @@ def _left(prediction: ExpertPrediction) -> Array:
     return np.asarray(np.divide(prediction.e_h, unshrunk, out=prediction.shrinkage.copy(), where=unshrunk != 0.0))
 
 
-TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, 5)
+TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, 5, 100.0)
 """Of the solver, for the physics model's plan and each Newton step: a plan is judged by the model itself, and taken if
 it is better than the others. With a margin as small as rounding an end that exceeds a bound by a millionth would be no
-plan; with a larger one there may be none within the bounds.
+plan; with a larger one there may be none within the bounds. From a larger complementarity five steps end farther inside
+the bounds: from that of ``EXACT`` a plan within limits that its command just keeps may change nothing, window after
+window.
 """
 
 _REACHES = (0.1, 0.01, 0.0)

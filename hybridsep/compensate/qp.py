@@ -24,9 +24,6 @@ from .splines import N_DECIDED, PlanCost, SplineBasis
 
 _FIRST_SLACK = 0.3  # smallest initial slack, in the bounds' unit: 0.01 takes half as many steps again
 
-_FIRST_MU = 10.0
-"""Initial complementarity μ, as a share of the cost per bound: with 1 the longest plans take 4 to 8 steps more."""
-
 _REGULARISATION = 1e-14
 """Proximal term of the multipliers, relative to rows and P: with less a factor may fail, more takes more steps."""
 
@@ -42,14 +39,15 @@ class Tolerance(NamedTuple):
     # tighten bounds by it
     margin: float
     steps: int  # largest number of steps
+    first_mu: float  # initial complementarity μ, as a share of the cost per bound
 
 
 _STEPS = 24  # largest number of steps of any tolerance
 
-EXACT = Tolerance(1e-15, 1e-9, 1e-11, _STEPS)
+EXACT = Tolerance(1e-15, 1e-9, 1e-11, _STEPS, 10.0)
 """A plan is the start of the next one, and the minimum is much better conditioned than an intermediate iterate:
 differences in rounding between two implementations stay small. 12 steps on average; 34 of 1 399 bounded plans with
-random parameters took all of them."""
+random parameters took all of them; from a μ of 1 the longest plans take 4 to 8 more."""
 
 
 class Minimum(NamedTuple):
@@ -74,7 +72,7 @@ def minimise(
     B, b = np.concatenate((rows, -rows)), np.concatenate((low, -high))
     x, m = start.copy(), len(rows)
     s, share = np.maximum(B @ x - b, _FIRST_SLACK), cost / len(b)
-    z, inner, beyond = _FIRST_MU * share / s, None, tolerance.margin
+    z, inner, beyond = tolerance.first_mu * share / s, None, tolerance.margin
     # Where active bounds hardly differ, rounding in rowsᵀ W rows would outgrow P
     rho = _REGULARISATION * float(np.max(np.sum(rows**2, axis=0)) / np.max(np.diag(P)))
     steps = 0

@@ -57,12 +57,12 @@ static void slacks_give_rows(const slacks *self, const hsep_real *y, hsep_real s
     }
 }
 
-/* Begin with B x in ds. cost: m2, of the beginning, for each of the bounds. */
-static void slacks_begin(const slacks *self, hsep_real cost)
+/* Begin with B x in ds, and a complementarity mu, m2. */
+static void slacks_begin(const slacks *self, hsep_real mu)
 {
     for (hsep_int r = 0; r < self->n; r++) {
         self->s[r] = hsep_fmax(self->ds[r] - self->b[r], HSEP_QP_FIRST_SLACK);
-        self->z[r] = HSEP_QP_FIRST_MU * cost / self->s[r];
+        self->z[r] = mu / self->s[r];
         self->inverse[r] = 1.0 / (self->s[r] + self->rho * self->z[r]);
     }
 }
@@ -271,7 +271,7 @@ HSEP_API void hsep_interior_begin(
     a.slacks.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
     slacks_take_rows(&a.slacks, a.slacks.rows, a.slacks.work, a.slacks.b);
     interior_rows(&a, a.problem.x);
-    slacks_begin(&a.slacks, self->cost);
+    slacks_begin(&a.slacks, self->tolerance.first_mu * self->cost);
 }
 
 /* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its terms. */

@@ -18,6 +18,7 @@ typedef struct {
     hsep_real dual_residual; /* dual residual at the end, as a share of its largest term */
     hsep_real margin;        /* shares by which its bounds are tighter, and may be exceeded at the end */
     hsep_int steps;          /* at most */
+    hsep_real first_mu;      /* mu at the beginning, as that at the end */
 } hsep_tolerance;
 
 #define HSEP_INTERIOR_PARTS 6 /* of a step */
@@ -34,7 +35,7 @@ typedef struct {
     /* followed by arrays, see interior_lay_out */
 } hsep_interior;
 
-HSEP_ASSERT_WORDS(hsep_interior, 19);
+HSEP_ASSERT_WORDS(hsep_interior, 20);
 
 HSEP_API hsep_real hsep_interior_size(hsep_int preview, hsep_int n); /* bytes of the block, counted as a number */
 

@@ -11,11 +11,10 @@
 
 /* hybridsep/compensate/qp.py */
 #define HSEP_QP_FIRST_SLACK 0.3
-#define HSEP_QP_FIRST_MU 10.0
 #define HSEP_QP_REGULARISATION 1e-14
 #define HSEP_QP_TAU 0.995
 #define HSEP_QP_STEPS 24
-#define HSEP_QP_EXACT 1e-15, 1e-09, 1e-11, 24
+#define HSEP_QP_EXACT 1e-15, 1e-09, 1e-11, 24, 10.0
 #define HSEP_QP_ROUNDING 1e-09
 #define HSEP_QP_INTERIOR 1e-10
 #define HSEP_QP_EXCEEDED 1.000001
@@ -24,7 +23,7 @@
 /* hybridsep/compensate/newton.py */
 #define HSEP_NEWTON_AT_STOP 0.999999
 #define HSEP_NEWTON_APART 4
-#define HSEP_NEWTON_TOLERANCE 0.0001, 0.01, 1e-05, 5
+#define HSEP_NEWTON_TOLERANCE 0.0001, 0.01, 1e-05, 5, 100.0
 #define HSEP_NEWTON_REACHES 0.1, 0.01, 0.0
 #define HSEP_NEWTON_STEP 5
 #define HSEP_NEWTON_FIRST_STEPS 4
