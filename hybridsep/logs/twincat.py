@@ -133,10 +133,8 @@ class TwinCatSource(ArraysSource):
         """Return a field of all lines down to the last one that has it."""
         is_time = field in {place.time for place in self._places.values()}
         counted = is_time and self._counted
-        end = (
-            next((i for i in reversed(range(len(self._lines))) if _cell(self._lines[i].split(self._mark), field)), -1)
-            + 1
-        )
+        rows = ((i, line.split(self._mark)) for i, line in reversed(list(enumerate(self._lines, start=1))))
+        end = next((i for i, row in rows if _cell(row, field)), 0)
         try:
             kind, mark = np.int64 if counted else np.float64, self._mark
             values = np.loadtxt(self._lines[:end], kind, delimiter=mark, usecols=field, comments=None, ndmin=1)

@@ -247,7 +247,7 @@ def test_a_command_that_is_none_is_held(folder: Path, cmd: float, said: str) -> 
     for _ in range(100):
         assert run.step(cmd)[STATE] == -1
     assert (run.component.messages, f"cmd must be {said}; the last one is held" in run.component.message) == (1, True)
-    assert run.shown[-1][[OUT, DELAYED]] == pytest.approx(30.0, abs=2e-3)
+    assert run.shown[-1][[OUT, DELAYED]] == pytest.approx(30.0, abs=1e-3)
     run.cmd[-1] = 30.0
     run.stay(100)
     assert run.shown[-1][STATE] >= 2

@@ -194,7 +194,8 @@ def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, 
     delay = int(values.get("measurement_delay", 0))
     n = 200 if values.get("Np") in (1, 2) else 650 if "averaging" in values else 500
     start = 0.1 if delay and "spacing" in values else 0.0
-    assert_agreement(new_stream, n, values, 1e-8, start=start, delay=delay)
+    tolerance = 1e-8 if values.get("Np") == 12 else 1e-9  # rounding grows from one of so short windows to the next
+    assert_agreement(new_stream, n, values, tolerance, start=start, delay=delay)
 
 
 @on_all((COMPENSATOR,), needs="agreement")

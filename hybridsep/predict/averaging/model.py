@@ -207,11 +207,8 @@ class AveragedModel:
         """Return the model at the beginning of another run, at rest; what was learned is kept, and doubted."""
         learned, most = self.learned, CONSTANTS.warm_windows_max * self.settings.Np
         evidence = self.evidence[0].begin_run(most), self.evidence[1].begin_run(most)
-        leading, errors, stacks = (
-            learned.stack.leader,
-            ExpertErrors(),
-            [one.forget(FRESH_START) for one in learned.stacks],
-        )
+        leading, errors = learned.stack.leader, ExpertErrors()
+        stacks = [one.forget(FRESH_START) for one in learned.stacks]
         if evidence[MODEL_RESIDUAL].earlier.n_rows > 0.0:
             stacks, errors = [one.copy(leading, FRESH_START) for one in stacks], learned.errors_of(leading)
         learned = replace(learned.with_errors({FRESH_START: errors}), stacks=tuple(stacks))
@@ -225,7 +222,8 @@ class AveragedModel:
 
     def for_plans(self) -> AveragedModel:
         """Return the model with the weights that plans weigh its experts by."""
-        return replace(self, learned=replace(self.learned, stacks=self.learned.stacks[1:] * 2))
+        _, of_plans = self.learned.stacks
+        return replace(self, learned=replace(self.learned, stacks=(of_plans, of_plans)))
 
     def take_over(self, learned: Learned, regressions: tuple[RidgeRegression, ...]) -> AveragedModel:
         """Return the model with what another one has learned."""
