@@ -19,7 +19,6 @@ from ..base.threads import one_blas_thread
 from ..base.version import __version__
 from ..compensate.compensator import SepCompensator
 from ..fmi.archive import build_fmu
-from ..fmi.weights import restore_weights, weights_file
 from ..identify.model import IdentifiedModel, machine_of, of_cascade
 from ..identify.operation import TOO_LITTLE, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
@@ -127,9 +126,8 @@ class Fit:
 
         ``compensate`` is the best model allowed: ``"off"``, ``"physics"`` or ``"hybrid"``.
         """
-        predictor = self.machine.new_predictor(self.machine.compensator_predictor)
-        restore_weights(predictor, weights_file(self.predictor()))
-        return SepCompensator(predictor, replace(self.machine.compensator_settings, compensate=compensate))
+        settings = replace(self.machine.compensator_settings, compensate=compensate)
+        return self.machine.new_compensator(settings, trained=self.predictor())
 
     def predict(self, x_d: ArrayLike) -> Prediction:
         """Return what is predicted, with what was learned, of a window ``(n,)`` from rest at its first command.

@@ -17,13 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import StateError
-from ..base.settings import PredictorSettings
 from ..base.state import numbers_of, with_numbers
-from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.regression import RidgeRegression
 from ..predict.uncertainty import Uncertainty
-from .variables import MODE
 
 if TYPE_CHECKING:  # as this module is packed, and machines are not
     from ..machines.machine import Machine
@@ -36,20 +33,9 @@ _CHECKSUM = struct.Struct("<Q")
 _DAMAGED = f"{WEIGHTS_FILE} is damaged, truncated or from another version; train again"
 
 
-def _learned_settings(settings: PredictorSettings, model: ModalModel) -> dict[str, float]:
-    """Return all settings on which a predictor's weights depend, by their names in the FMU."""
-    numbers = settings.to_fmi()
-    learned = [name for name, parameter in PredictorSettings.fmi_parameters().items() if parameter.learned]
-    values: dict[str, float] = {name: numbers[name] for name in learned}
-    values["dead_time"] = model.dead_time
-    for i, mode in enumerate(model.modes, start=1):
-        values |= {f"mode[{i}].{name}": getattr(mode, name) for name in MODE}
-    return values
-
-
 def weights_file(predictor: HybridPredictor) -> bytes:
     """Return the file's content for a trained predictor."""
-    settings = _learned_settings(predictor.settings, predictor.model)
+    settings = predictor.learned_with
     learned = numbers_of(_learned(predictor))
     content = _HEAD.pack(_MAGIC, len(settings), len(predictor.model.modes), len(learned))
     content += b"".join(_SETTING.pack(name.encode(), value) for name, value in settings.items())
@@ -81,7 +67,7 @@ def restore_weights(predictor: HybridPredictor, content: bytes) -> None:
         for name, value in _SETTING.iter_unpack(body[_HEAD.size : start])
     }
     problems = _differences("the number of modes", n_modes, len(predictor.model.modes))
-    settings = _learned_settings(predictor.settings, predictor.model)
+    settings = predictor.learned_with
     for name, then in learned.items():
         if name in settings or not name.startswith("mode["):
             problems += _differences(name, then, settings.get(name, 0.0))
@@ -129,9 +115,9 @@ def warm_predictor(machine: "Machine", weights: str | Path | None) -> HybridPred
 def saved_weights(path: str | Path | None, machine: "Machine", kind: str) -> bytes | None:
     """Return weights.bin for a predictor saved by :meth:`HybridPredictor.save`; None where ``path`` is None.
 
-    It must have been trained for the machine: with its ``input_hold``, modes, and all settings on which weights depend
-    (:func:`_learned_settings`), its predictor's or compensator's as ``kind`` says. Its window may be another one:
-    weights that a predictor learned serve a compensator.
+    It must have been trained for the machine: with its ``input_hold`` and
+    :attr:`~hybridsep.predict.predictor.HybridPredictor.learned_with`, its predictor's or compensator's as ``kind``
+    says. Its window may be another one: weights that a predictor learned serve a compensator.
 
     StateError if the file is not a saved predictor, one of another machine, naming all that differs, or has learned
     nothing.
@@ -147,16 +133,7 @@ def _load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPred
         raise StateError(f"{path.name}: {error}") from error
     compensates = kind == "SepCompensator"
     settings = machine.compensator_predictor if compensates else machine.predictor_settings
-    found, expected = (  # by their names in the machine file
-        {**_learned_settings(one, model), "input_hold": one.input_hold}
-        for one, model in ((trained.settings, trained.model), (settings, machine.model))
-    )
-    differing = [
-        f"{name} = {found.get(name, 'none')} instead of {expected.get(name, 'none')}"
-        for name in {**expected, **found}
-        if found.get(name) != expected.get(name)
-    ]
-    if differing:
+    if differing := machine.new_predictor(settings).differences(trained):
         subject = "'s compensator" if compensates else ""
         raise StateError(
             f"{path.name} was not trained for machine {machine.name}{subject}: it has {', '.join(differing)}; "

@@ -154,12 +154,23 @@ class Machine(FileSection):
         return HybridPredictor(self.model, self.predictor_settings if settings is None else settings)
 
     def new_compensator(
-        self, settings: CompensatorSettings | None = None, *, predictor: PredictorSettings | None = None
+        self,
+        settings: CompensatorSettings | None = None,
+        *,
+        predictor: PredictorSettings | None = None,
+        trained: "HybridPredictor | None" = None,
     ) -> "SepCompensator":
-        """Return a compensator, by :attr:`compensator_settings` and :attr:`compensator_predictor` if left out."""
+        """Return a compensator, by :attr:`compensator_settings` and :attr:`compensator_predictor` if left out.
+
+        ``trained``: predictor of this machine, such as ``HybridPredictor.load("trained.state")`` that ``fit`` wrote,
+        with whose weights it begins; its windows may be others than the compensator's. StateError if it is another
+        machine's.
+        """
         from ..compensate.compensator import SepCompensator
 
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
+        if trained is not None:
+            own.begin_with(trained)
         return SepCompensator(own, self._compensation() if settings is None else settings)
 
     def new_plant(self, **changes: float | str) -> FeedDrive | StageDrive:

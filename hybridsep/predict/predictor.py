@@ -130,10 +130,39 @@ class HybridPredictor:
         self.planned = True
         self.state = replace(self.state, residual=self.residual.plan_ahead())
 
+    @property
+    def learned_with(self) -> dict[str, float]:
+        """All settings, and the modes, on which what is learned depends, by their names in an FMU."""
+        numbers, parameters = self.settings.to_fmi(), PredictorSettings.fmi_parameters()
+        values: dict[str, float] = {name: numbers[name] for name, one in parameters.items() if one.learned}
+        values["dead_time"] = self.model.dead_time
+        for i, mode in enumerate(self.model.modes, start=1):
+            values |= {f"mode[{i}].{name}": value for name, value in asdict(mode).items()}
+        return values
+
+    def differences(self, trained: "HybridPredictor") -> list[str]:
+        """Return, in words, what must not differ in a predictor whose weights this one takes; its window may."""
+        found, expected = ({**one.learned_with, "input_hold": one.settings.input_hold} for one in (trained, self))
+        return [
+            f"{name} = {found.get(name, 'none')} instead of {expected.get(name, 'none')}"
+            for name in {**expected, **found}
+            if found.get(name) != expected.get(name)
+        ]
+
     def take_over(self, learned: Any, uncertainty: Uncertainty, regressions: tuple[RidgeRegression, ...]) -> None:
-        """Take over what another predictor with the same settings has learned; :meth:`restart` then begins a run."""
+        """Take over what another predictor has learned, without its run; :meth:`restart` then begins one."""
         residual = self.residual.take_over(learned, regressions)
         self.state = replace(self.state, residual=residual, uncertainty=uncertainty)
+
+    def begin_with(self, trained: "HybridPredictor") -> None:
+        """Begin a run at rest with what another predictor has learned, such as one of longer windows.
+
+        StateError, naming all that differs, if that was learned with another model or with other features.
+        """
+        if differing := self.differences(trained):
+            raise StateError(f"the predictor was trained for another one: it has {', '.join(differing)}")
+        self.take_over(trained.residual.learned, trained.state.uncertainty, trained.residual.regressions)
+        self.restart()
 
     @one_blas_thread
     def predict(self, x_d: ArrayLike, *, path: Array | None = None, scales: FeatureScales | None = None) -> Prediction:

@@ -12,8 +12,9 @@ from quick_fits import without_larger_structures, without_other_settings
 from staircase_data import commanded, measured
 
 import hybridsep
-from hybridsep.base.errors import LogError, ParameterError, SignalError
+from hybridsep.base.errors import LogError, ParameterError, SignalError, StateError
 from hybridsep.fitting.fit import Fit
+from hybridsep.fmi.weights import restore_weights, weights_file
 
 N, NP = 1200, 40
 PART = np.r_[:600, 999:1599]  # moves in each half, between them at rest
@@ -78,7 +79,16 @@ def test_what_is_returned_predicts_compensates_and_shows_itself(axis: Fit, tmp_p
     [log] = axis.logs
     again = hybridsep.backtest(axis.predictor(), log)
     assert again.overall == hybridsep.backtest(axis.predictor(), log.x_d, log.x_meas).overall
-    plant = hybridsep.load_machine("spring_mass_damper").new_plant()
+    drive = hybridsep.load_machine("spring_mass_damper")
+    plant, compensator = drive.new_plant(), axis.compensator()
+    assert compensator.predictor.Np == axis.machine.compensator_predictor.Np != axis.predictor().Np
+    as_in_fmus = axis.machine.new_predictor(axis.machine.compensator_predictor)
+    restore_weights(as_in_fmus, weights_file(axis.predictor()))
+    assert hybridsep.SepCompensator(as_in_fmus, compensator.settings).to_bytes() == compensator.to_bytes()
+    with pytest.raises(
+        StateError, match=r"was trained for another one: it has .*mode\[1\]\.zeta = 1\.0 instead of 0\.0499"
+    ):
+        drive.new_compensator(trained=axis.predictor())
     off, hybrid = (hybridsep.cosimulate(axis.compensator(how), plant, log).tracking_rms for how in ("off", "hybrid"))
     assert hybrid < 0.2 * off
     axis.report(tmp_path / "report.html")
