@@ -103,8 +103,8 @@ def _print_tracking(
     print_rows(title, ["", f"RMS [{small}]", f"max [{small}]"], rows)
     peaks = [summary[f"peak_{name}"] for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")]
     console.print(
-        f"command to the drive: at most {factor * peaks[0]:.1f} {position}/s, {peaks[1]:.2f} {unit}/s², "
-        f"{peaks[2]:.0f} {unit}/s³\n"
+        f"command to the drive: at most {factor * peaks[0]:.4g} {position}/s, {factor * peaks[1]:.4g} {position}/s², "
+        f"{factor * peaks[2]:.4g} {position}/s³\n"
         f"planned by the hybrid {summary['share_hybrid']:.1%}, by the physics model {summary['share_physics']:.1%}, "
         f"not compensated {summary['share_off']:.1%}, tripped {summary['share_tripped']:.1%} of the samples"
     )

@@ -19,7 +19,7 @@ from scipy.signal import lfilter
 from ..base.settings import CompensatorSettings
 from ..base.signals import Array, as_published
 from ..online.look_ahead import SepState
-from ..predict.averaging.experts import EXPERTS
+from ..predict.averaging.experts import EXPERTS, MODEL_RESIDUAL
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
@@ -236,11 +236,18 @@ RETRY = 0.5
 """Time for which the averaged model plans nothing after the first of its plans that ran away, s; twice as long after
 each further one of a run."""
 
-FASTER, _UNPROVEN = 1.25, 0.5
+FASTER, UNPROVEN = 1.25, 0.5
 """Speed of the preview, relative to the fastest motion that was learned, above which plans may change the command by
 this share of ``change_max`` only. ``change_max`` is to be twice the largest error without compensation, so this is that
 error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
 may change it by all of ``change_max`` where weights of earlier runs judge it."""
+
+_HELD_BACK, _KNOWN = 0.3, 20.0
+"""Share of a new plan's change of the last one that is held back once much is learned, and windows of samples by which
+half of it is. A new plan corrects what it has just learned; where a drive is too slow for that, or the model is wrong
+for some frequencies, the next plan takes back what this one has corrected, and the command swings from window to
+window, also at rest. Held back, it has 0.94 of the error warm, and a third of the motion at rest. While a model learns,
+each plan has to go all the way: 0.3 from the first plan on are 4 % more, cold."""
 
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
@@ -295,7 +302,7 @@ class AveragedPlanning(Planning):
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, self.without_model(preview), scales)
         g, free = predictor.physics_operator(self.horizon)
-        change = _UNPROVEN if model.outgrows(FASTER) else 1.0
+        change = UNPROVEN if model.outgrows(FASTER) else 1.0
         of_physics_change = 1.0 if model.is_trained else change
         has_learned = predictor.k >= predictor.n_init and model.has_learned
         follows = has_learned and most is SepState.HYBRID and not self.paused
@@ -328,7 +335,10 @@ class AveragedPlanning(Planning):
                     deltas = values @ hybrid.coefficients, values @ physics
                     is_away = runs_away(*deltas, error, self.settings.change_max)
                     if not is_away:
-                        return ChosenPlan(SepState.HYBRID, hybrid.coefficients, scales)
+                        n = averaged.evidence[MODEL_RESIDUAL].n_rows / self.Np
+                        share = 1.0 - _HELD_BACK * n / (n + _KNOWN)
+                        found = previous_plan + share * (hybrid.coefficients - previous_plan)
+                        return ChosenPlan(SepState.HYBRID, found, scales)
             if is_better(last.cost, of_physics.cost):
                 return ChosenPlan(SepState.OFF, last.coefficients, scales, is_away)
         return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)

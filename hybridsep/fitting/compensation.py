@@ -12,7 +12,7 @@ from ..base.metrics import ErrorSize, largest, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, CompensatorSettings, Limits
 from ..base.signals import Array
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
-from ..compensate.planning import FASTER
+from ..compensate.planning import FASTER, UNPROVEN
 from ..cosim.inverse import FirInverse
 from ..identify.output_error import in_time
 from ..logs.checks import resolution
@@ -79,13 +79,18 @@ def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
     return found
 
 
+def held_for(x_d: Array) -> int:
+    """Return for how many samples each command is held."""
+    intervals = np.diff(np.flatnonzero(np.diff(x_d)))
+    return int(np.quantile(intervals, _HELD)) if len(intervals) > _STEPS else 1
+
+
 def _motion(x_d: Array, T_s: float) -> list[float]:
     """Return the largest velocity, acceleration and jerk of commands, ``(n,)``, without what holds and rounds them.
 
     Differences are over as many samples as a command is held for, and as make its rounding small against them.
     """
-    intervals = np.diff(np.flatnonzero(np.diff(x_d)))
-    held = int(np.quantile(intervals, _HELD)) if len(intervals) > _STEPS else 1
+    held = held_for(x_d)
     x_d, T_s = x_d[::held], held * T_s
     # Rounding is white noise where the command moves, but not at every speed, and no more than its smallest change
     rough = np.abs(np.diff(x_d, 5))[x_d[5:] != x_d[:-5]]
@@ -214,14 +219,14 @@ class LookAheads:
     def lines(self) -> list[str]:
         """Return the look-ahead that is advised, and why, in words; empty where the machine's is as good as any."""
         now = next(one for one in self.tried if one.preview == self.chosen)
-        if (longer := self.longer(now)) is None:
-            if (shortest := self.shortest) == self.chosen:
-                return []
+        if (shortest := self.shortest) != self.chosen:
             return [
-                f"Where the model is right, plans leave as little with --look-ahead {1e3 * shortest * self.T_s:.4g}ms: "
+                f"Where the model is right, plans leave no more with --look-ahead {1e3 * shortest * self.T_s:.4g}ms: "
                 "they need less of the command ahead, and follow younger measurements in shorter windows, at more work "
                 "in a sample (up to three times)."
             ]
+        if (longer := self.longer(now)) is None:
+            return []
         here, there = (f"{1e3 * one.preview * self.T_s:.4g}" for one in (now, longer))
         return [
             f"The look-ahead of {here} ms is too short for the drive: where the model is right, plans leave "
@@ -248,6 +253,7 @@ class Tracking:
     duration: float  # of the samples that are tried, of a long log from its beginning, s
     largest: float  # servo error of the whole logs, m
     motion: Mapping[str, Sequence[float]]  # name of a limit → largest of the logs' commands, and the drive's, SI
+    held: int  # samples for which each command is held
     look_aheads: LookAheads | None  # None where the model has no error to compensate
 
     def lines(self, shown: DisplayUnits) -> list[str]:
@@ -275,6 +281,11 @@ class Tracking:
             lines.append(
                 f"The largest servo error of the log, {shown.words(self.largest, '.4g')}, is above change_max: "
                 f"{left} of it cannot be compensated."
+            )
+        if self.held > 1:
+            lines.append(
+                f"The log's commands are held for {self.held} samples each; where their steps exceed a limit, that "
+                "bounds what the compensator adds."
             )
         factor, unit = shown.position
         for power, (name, sizes) in zip(("", "²", "³"), self.motion.items(), strict=False):
@@ -336,7 +347,7 @@ def expected_tracking(
     reached = {name: (size, most) for size, (name, most) in zip(motion.tolist(), drive.items(), strict=False)}
     return Tracking(
         *(none, physics, hybrid, inverse, bound, costs, *limits, len(without) * machine.T_s),
-        *(error, reached, ahead),
+        *(error, reached, max((held_for(one.x_d) for one in recordings), default=1), ahead),
     )
 
 
@@ -385,7 +396,9 @@ class Stretch:
     def expected(self, settings: CompensatorSettings, Np: int) -> Expected:
         """Return the errors to be expected with a compensator's settings and ``Np`` samples in a window."""
         known = replace(self.machine.compensator_predictor, Np=Np, p=1, q=0, measurement_delay=0)
-        physics, pair = replace(settings, compensate="physics"), (self.x_d, self.x)
+        # Half of a bound is for motion that has not been learned, as here
+        most = None if settings.change_max is None else settings.change_max / UNPROVEN
+        physics, pair = replace(settings, compensate="physics", change_max=most), (self.x_d, self.x)
         (found,) = expected_errors(self.machine.model, known, physics, [pair], learn=False)
         return Expected(*(signal[self.judged] for signal in found))
 

@@ -69,15 +69,18 @@ def split_log(pieces: Iterable[tuple[Array, Array]], share: float, n_settling: i
 def beginnings(recordings: Sequence[Recording], n_most: int) -> list[Recording]:
     """Return the beginnings of recordings, ``n_most`` samples in all, half of them for training at most.
 
-    They begin where the recordings do, as what is learned of the position counts from there, and end at rest where the
-    command rests in the last quarter.
+    They begin where the recordings do, as what is learned of the position counts from there, less a long rest before
+    the first motion, and end at rest where the command rests in the last quarter.
     """
     n = sum(len(one.x) for one in recordings)
     if n <= n_most:
         return list(recordings)
     found = []
     for one in recordings:
-        end = max(n_most * len(one.x) // n, 2)
+        end, moving = max(n_most * len(one.x) // n, 2), np.flatnonzero(np.diff(one.x_d))
+        rest = max(0, min(int(moving[0]) if len(moving) else 0, len(one.x) - end) - end // 20)
+        counts = (max(count - rest, 0) for count in (one.n_train, one.n_settling))
+        one = Recording(one.x_d[rest:], one.x[rest:], *counts)
         at_rest = np.flatnonzero(np.diff(one.x_d[3 * end // 4 : end]) == 0.0)
         last = 3 * end // 4 + int(at_rest[-1]) + 2 if len(at_rest) else end
         settling = min(one.n_settling, last)

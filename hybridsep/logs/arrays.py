@@ -126,6 +126,8 @@ class TableSource(_GivenSource):
         if labels.dtype.kind in "iu" and not known_names("t", [name]):
             steps = np.diff(labels.astype(np.int64))
             usual = float(np.median(steps))
+            if (steps < 0).all():
+                raise LogError(f"{self.path}: the index runs backwards; sort_index() puts the rows in their order")
             if usual == 0.0 or (steps == usual).all():
                 return
             labels = (labels - labels[0]) / usual

@@ -9,7 +9,7 @@ from hybridsep import Limits, ModalModel, Mode, rest_to_rest, simulate
 from hybridsep.base.metrics import peak_derivatives
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.fitting.compensation import estimated_limits, largest_motion
+from hybridsep.fitting.compensation import estimated_limits, held_for, largest_motion
 from hybridsep.fitting.plant import commands_to_try, identified_plant
 from hybridsep.fitting.replay import Recording
 from hybridsep.logs.units import shown_in
@@ -82,6 +82,7 @@ def test_motion_is_estimated_without_what_holds_or_rounds_a_command(held: int, r
     T_s, limits = 2.5e-4, Limits(0.5, 10.0, 700.0)
     x_d = rest_to_rest([0.0, 0.09, 0.03, 0.15], limits, T_s, start_times=[rest, rest + 0.5, rest + 1.0])
     x_d = x_d[np.arange(len(x_d)) // held * held]
+    assert held_for(x_d) == held
     x_d = rounded * np.round(x_d / rounded) if rounded else x_d
     peaks, _ = largest_motion([Recording(x_d, x_d, 9)], T_s)
     assert peaks == pytest.approx([0.5, 10.0, 700.0], rel=0.2)

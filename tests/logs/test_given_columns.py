@@ -172,6 +172,7 @@ def test_labels_of_samples() -> None:
         hybridsep.cosimulate(predictor, machine.new_plant(), kept)
     levels = Labelled(np.arange(N))
     levels.nlevels = 2  # type: ignore[attr-defined]
+    refused(r"the index runs backwards; sort_index\(\)", Frame(np.arange(len(X))[::-1], x_d=X_D, x=X), T_s=1e-3)
     refused(r"several levels is not read; reset_index\(\) makes columns", Frame(levels, x_d=X_D, x=X), T_s=1e-3)
 
 

@@ -340,6 +340,11 @@ static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_ave
             self->paused = self->pause;
             self->pause *= 2;
         } else {
+            const hsep_real *last = hsep_at(self, self->rest);
+            hsep_real *best = hsep_at(self, self->best);
+            for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
+                best[j] = last[j] + self->share * (best[j] - last[j]);
+            }
             plan = self->best;
             self->planned = 2;
         }
@@ -658,6 +663,9 @@ HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hse
     self->follows = self->judges && best > 1 && self->paused == 0;
     self->ends = (best == 0 && was_planned > 0) || (self->judges && best > 1 && self->paused > 0);
     self->paused -= self->paused > 0;
+    const hsep_real n_rows = hsep_warm_start_n_rows(hsep_averaged_evidence(task->model, HSEP_MODEL_RESIDUAL));
+    const hsep_real n = n_rows / (hsep_real)self->Np;
+    self->share = 1.0 - HSEP_PLANNING_HELD_BACK * n / (n + HSEP_PLANNING_KNOWN);
     hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), 0); /* work follows from shares */
     const averaged_planner_work work = averaged_planner_work_of(self, task);
     /* This sample has cost that; what is learned at the end of the last window costs as much as commands of a plan */

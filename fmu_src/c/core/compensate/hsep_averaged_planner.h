@@ -50,6 +50,7 @@ typedef struct {
     hsep_real cost;         /* m2, of the best plan so far, */
     hsep_real cost_of_rest; /* and of the remainder of the last plan */
     hsep_real bound;        /* share of change_max that bounds the averaged model's plan */
+    hsep_real share;        /* of its change of the last plan that is taken */
     hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
     hsep_real left;         /* and that this part and all after it nearly always take */
     /* Offsets in words from the beginning of the struct */
@@ -73,7 +74,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 43);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 44);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
