@@ -197,7 +197,10 @@ class SepCompensator:
         x_dm = command[:Np] + delta
         prediction = predictor.predict(x_dm + loads[:Np], path=path, scales=chosen.scales)
         now = command[:Np].copy()
-        self._pending = PendingPlan(coefficients, delta, now, stop, chosen.state, chosen.runs_away)
+        share, correction = self._planning.share, np.zeros_like(coefficients)
+        if chosen.share is not None:
+            share, correction = chosen.share, chosen.coefficients - self._previous_plan
+        self._pending = PendingPlan(coefficients, delta, now, stop, chosen.state, chosen.runs_away, share, correction)
         as_published(prediction.x_pb, "x_pb")
         x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state, compensate)
         return PublishedWindow(
@@ -229,7 +232,7 @@ class SepCompensator:
         self._delta_before = np.concatenate((self._delta_before, pending.delta))[-3:]
         self._x_d_before = x_d[-len(self._x_d_before) :]
         self._state_before = pending.state
-        self._planning.follow(runs_away=pending.runs_away)
+        self._planning.follow(pending)
         self._pending = None
 
     def _bounds(self, settings: CompensatorSettings) -> DriveBounds:
@@ -250,7 +253,8 @@ class SepCompensator:
 
     def _saved(self) -> tuple[Any, ...]:
         planning = self._planning
-        return *(getattr(self, name) for name in self._SAVED), planning.paused, planning.pause, planning.ahead
+        of_planning = planning.paused, planning.pause, planning.ahead, planning.share, planning.corrected
+        return *(getattr(self, name) for name in self._SAVED), *of_planning
 
     @classmethod
     def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> "SepCompensator":
@@ -264,12 +268,13 @@ class SepCompensator:
             compensator = cls(predictor, CompensatorSettings.from_table(meta["settings"]))
             compensator.predictor = kept  # the constructor has restarted the other one
             nothing = np.zeros(compensator.predictor.Np)
-            pending = PendingPlan(
-                compensator._previous_plan, nothing, nothing, compensator._last_stop, SepState.OFF, False
-            )
+            plan, stop = compensator._previous_plan, compensator._last_stop
+            pending = PendingPlan(plan, nothing, nothing, stop, SepState.OFF, False, 1.0, plan)
             like = compensator._saved(), pending if meta["is_planned"] else ()
             planning = compensator._planning
-            (*saved, planning.paused, planning.pause, planning.ahead), found = restored(like, arrays)
+            (*saved, paused, pause, ahead, share, corrected), found = restored(like, arrays)
+            planning.paused, planning.pause, planning.ahead = paused, pause, ahead
+            planning.share, planning.corrected = share, corrected
             for name, value in zip(cls._SAVED, saved, strict=True):
                 setattr(compensator, name, value)
             compensator._pending = found or None

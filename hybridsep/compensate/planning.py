@@ -19,7 +19,7 @@ from scipy.signal import lfilter
 from ..base.settings import CompensatorSettings
 from ..base.signals import Array, as_published
 from ..online.look_ahead import SepState
-from ..predict.averaging.experts import EXPERTS, MODEL_RESIDUAL
+from ..predict.averaging.experts import EXPERTS
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
@@ -43,6 +43,8 @@ class PendingPlan:
     stop: Array  # (n,), m: coefficients of its stop, where the plan is longer than the preview
     state: SepState  # model of the plan
     runs_away: bool  # whether the residual model's plan ran away, so that it plans none for a time
+    share: float  # of the residual model's change of the last plan that is taken
+    correction: Array  # (3 + n_free,), m: what was taken; 0 of any other plan
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ class ChosenPlan(NamedTuple):
     coefficients: Array  # (3 + n_free,), m
     scales: FeatureScales | None  # of the residual model's features
     runs_away: bool = False  # whether the residual model's plan ran away
+    share: float | None = None  # of the residual model's change of the last plan that is taken, if it planned
 
 
 class PublishedPosition(NamedTuple):
@@ -87,6 +90,8 @@ class Planning(ABC):
     # shape (n_ahead, n_experts, Np), in m: entry i is what is stacked for the i-th window from this one, by the plan of
     # half a plan before it, the last one by this window's; NaN where nothing is known; with the paper's model none
     ahead: Array
+    share: float  # of the residual model's change of a plan that was taken last
+    corrected: Array  # (3 + n_free,), m: what that was, in the remainder of the last plan
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         self.basis, self.bounds, self.settings, self.Np = basis, bounds, settings, Np
@@ -100,11 +105,14 @@ class Planning(ABC):
         """Begin another run, with a sampling interval in s: nothing is paused."""
         self.paused, self.pause = 0, max(1, int(RETRY / (self.Np * T_s) + 0.5))  # rounded as in C
         self.ahead = np.empty((0, 0, self.Np))
+        self.share, self.corrected = 1.0, np.zeros(N_DECIDED + self.basis.n_free)
 
-    def follow(self, *, runs_away: bool) -> None:
+    def follow(self, plan: PendingPlan) -> None:
         """Count a window that followed its plan."""
+        kept = self.Np // self.spacing
+        self.share, self.corrected = plan.share, np.concatenate((plan.correction[kept:], np.zeros(kept)))
         self.ahead = np.concatenate((self.ahead[1:], np.full_like(self.ahead[:1], np.nan)))
-        if runs_away:
+        if plan.runs_away:
             self.paused, self.pause = self.pause, 2 * self.pause
         else:
             self.paused = max(0, self.paused - 1)
@@ -242,12 +250,12 @@ this share of ``change_max`` only. ``change_max`` is to be twice the largest err
 error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
 may change it by all of ``change_max`` where weights of earlier runs judge it."""
 
-_HELD_BACK, _KNOWN = 0.3, 20.0
-"""Share of a new plan's change of the last one that is held back once much is learned, and windows of samples by which
-half of it is. A new plan corrects what it has just learned; where a drive is too slow for that, or the model is wrong
-for some frequencies, the next plan takes back what this one has corrected, and the command swings from window to
-window, also at rest. Held back, it has 0.94 of the error warm, and a third of the motion at rest. While a model learns,
-each plan has to go all the way: 0.3 from the first plan on are 4 % more, cold."""
+_TAKEN_BACK, _LEAST_SHARE, _NEAR, _UNCHANGED = 0.2, 0.4, 4, 1e-12
+"""A plan takes a share of its change of the last one, which grows or falls by the first times the cosine between what
+it changes and what the last plan has changed, up to 1 and down to the second. Both are taken over so many windows, and
+count where their product is more than the last of the square of the plan: less may be rounding. A new plan corrects
+what was measured last; where a drive is too slow for that, or the model wrong at a frequency, the next one takes back
+what this one has corrected, and the command swings from window to window, also at rest."""
 
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
@@ -335,13 +343,20 @@ class AveragedPlanning(Planning):
                     deltas = values @ hybrid.coefficients, values @ physics
                     is_away = runs_away(*deltas, error, self.settings.change_max)
                     if not is_away:
-                        n = averaged.evidence[MODEL_RESIDUAL].n_rows / self.Np
-                        share = 1.0 - _HELD_BACK * n / (n + _KNOWN)
-                        found = previous_plan + share * (hybrid.coefficients - previous_plan)
-                        return ChosenPlan(SepState.HYBRID, found, scales)
+                        step = hybrid.coefficients - previous_plan
+                        share = self._share_of(step, previous_plan)
+                        return ChosenPlan(SepState.HYBRID, previous_plan + share * step, scales, share=share)
             if is_better(last.cost, of_physics.cost):
                 return ChosenPlan(SepState.OFF, last.coefficients, scales, is_away)
         return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)
+
+    def _share_of(self, change: Array, plan: Array) -> float:
+        """Return which share of a change of the last plan, both ``(3 + n_free,)``, m, is taken."""
+        near = slice(N_DECIDED + self.n_pinned, N_DECIDED + _NEAR * (self.Np // self.spacing))
+        now, before, plan = change[near], self.corrected[near], plan[near]
+        size = math.sqrt(float(now @ now) * float(before @ before))
+        cosine = float(now @ before) / size if size > _UNCHANGED * float(plan @ plan) else 0.0
+        return min(max(self.share * (1.0 + _TAKEN_BACK * cosine), _LEAST_SHARE), 1.0)
 
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
         """Return the model's position wherever it may plan.

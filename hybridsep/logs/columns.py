@@ -155,7 +155,7 @@ def _only_clock(source: Source) -> str | None:
     return clocks[0]
 
 
-def _missing(source: Source, names: Mapping[str, str]) -> LogError:
+def _check_names(source: Source) -> None:
     plain = [name.partition("#")[0] for name in source.names]
     if plain and all(is_number(name) or stamp_kind(name) for name in plain):
         kinds = "t,x_d,x" if len(source.names) == 3 else "t,x_d,x and what the others are"
@@ -163,6 +163,10 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
             f"{source.path}: has no line of names, its first line is numbers ({listed(plain)}); put one above, such as "
             f"{kinds}: time, commanded and measured position, with units if they are not SI, as in x_d [mm]"
         )
+
+
+def _missing(source: Source, names: Mapping[str, str]) -> LogError:
+    _check_names(source)
     if "x_d" in names and names["x_d"] == names.get("x"):  # of a trajectory, which has no other position
         it = f"column {brief(names['x_d'])} is missing, the file has {listed(source.names)}"
         return LogError(f"{source.path}: {it}; call the commanded position so in the file")
@@ -231,7 +235,8 @@ class _Channel:
 
 
 def channels(source: Source) -> list[_Channel]:
-    """Return a file's columns with their units and roles, as far as they can be told."""
+    """Return a file's columns with their units and roles, as far as they can be told; LogError if it has no names."""
+    _check_names(source)
     roles: dict[str | None, str] = {}
     with suppress(LogError):  # there are several
         pair = _positions(source, {}, None)[0]

@@ -115,6 +115,8 @@ def test_channels_are_listed(tmp_path: Path, hybridsep: Run) -> None:
     out = hybridsep.done("fit", odd, "--list-channels")
     words = "none is read as the commanded and measured position; name it: hybridsep fit "
     assert f"{words}{odd} --x_d NAME --x NAME" in out
+    odd.write_text("0.000 0 0\n0.001 0 0\n0.002 0 0\n")
+    assert "has no line of names, its first line is numbers" in hybridsep.refused("fit", odd, "--list-channels")
 
 
 def test_rates_that_differ_are_said_and_resampled(tmp_path: Path, hybridsep: Run) -> None:

@@ -179,6 +179,21 @@ def test_without_anything_learned_the_physics_model_plans() -> None:
 
 
 @pytest.mark.slow
+def test_a_plan_takes_less_of_a_change_that_takes_back_the_last_one() -> None:
+    """The same plan behind a last one that changed nothing, the opposite in the near part, and the same."""
+    x_d, sep = moves()[:200], SepCompensator.from_bytes(learned())
+    assert sep.plan(x_d).state is SepState.HYBRID
+    whole, planning = sep._pending.coefficients, sep._planning  # type: ignore[union-attr]
+    for before, corrected, share in ((1.0, -whole, 0.8), (0.45, -whole, 0.4), (0.5, whole, 0.6), (0.9, whole, 1.0)):
+        planning.share, planning.corrected = before, 1e-3 * corrected
+        sep.plan(x_d)
+        np.testing.assert_allclose(sep._pending.coefficients, share * whole, rtol=1e-9)  # type: ignore[union-attr]
+    sep.update(x_d[:50])
+    assert planning.share == 1.0
+    np.testing.assert_allclose(planning.corrected[:-25], whole[25:], rtol=1e-9)  # the remainder of the last one was 0
+
+
+@pytest.mark.slow
 def test_plans_follow_friction_that_follows_the_command() -> None:
     physics, (first, sep) = run(compensator(compensate="physics")), cold()
     warm = run(SepCompensator.from_bytes(sep), t_init=0.0)

@@ -40,6 +40,7 @@ HSEP_API hsep_real hsep_averaged_planner_lay_out(
     self->e_h = hsep_take(&end, all + (hsep_real)parameters->settings->p);
     self->target = hsep_take(&end, preview);
     self->weight = hsep_take(&end, preview);
+    self->corrected = hsep_take(&end, (hsep_real)n);
     self->begins = hsep_take(&end, (hsep_real)m);
     self->shapes = hsep_take(&end, HSEP_AVERAGED_SHAPES * (hsep_real)planner->spacing);
     self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
@@ -256,6 +257,7 @@ HSEP_API void hsep_averaged_planner_init(
     (void)hsep_averaged_planner_lay_out(self, parameters, planner);
     self->pause =
         (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings->T_s) + 0.5);
+    self->share = 1.0;
     hsep_linearised_init(hsep_part(self, self->linearised), parameters);
     const hsep_int half = self->preview / 2, begin = self->Np > half ? self->Np : half, falling = self->preview - begin;
     hsep_real *weight = hsep_at(self, self->weight);
@@ -328,7 +330,42 @@ static int averaged_planner_runs_away(const hsep_averaged_planner *self, const h
     return error > HSEP_PLANNING_LEFT && longer > HSEP_PLANNING_BOUND_SHARE;
 }
 
-/* Take the plan whose cost is lowest; the physics model's was predicted last. */
+/* Forget what the last plan changed but for what is in its remainder, which this plan may change. */
+static void averaged_planner_shift(hsep_averaged_planner *self, hsep_int kept)
+{
+    hsep_real *corrected = hsep_at(self, self->corrected);
+    const hsep_int left = self->follows && kept < self->n ? self->n - kept : 0;
+    memmove(corrected, corrected + (self->n - left), (size_t)left * sizeof(hsep_real));
+    memset(corrected + left, 0, (size_t)(self->n - left) * sizeof(hsep_real));
+}
+
+/* Take a share of what the best plan changes, smaller where it takes back what the last plan has changed. */
+static void averaged_planner_take(hsep_averaged_planner *self, const hsep_planner *planner)
+{
+    const hsep_int near = HSEP_PLANNING_NEAR * (self->Np / hsep_planner_splines(planner)->spacing);
+    const hsep_int first = planner->n_pinned, end = near < self->n ? near : self->n;
+    hsep_real *best = hsep_at(self, self->best) + HSEP_N_DECIDED, *corrected = hsep_at(self, self->corrected);
+    const hsep_real *rest = hsep_at(self, self->rest) + HSEP_N_DECIDED;
+    hsep_real product = 0.0, now = 0.0, before = 0.0, plan = 0.0;
+    for (hsep_int i = first; i < end; i++) {
+        const hsep_real change = best[i] - rest[i];
+        product += change * corrected[i];
+        now += change * change;
+        before += corrected[i] * corrected[i];
+        plan += rest[i] * rest[i];
+    }
+    const hsep_real size = hsep_sqrt(now * before);
+    const hsep_real cosine = size > HSEP_PLANNING_UNCHANGED * plan ? product / size : 0.0;
+    self->share = hsep_fmax(self->share * (1.0 + HSEP_PLANNING_TAKEN_BACK * cosine), HSEP_PLANNING_LEAST_SHARE);
+    self->share = hsep_fmin(self->share, 1.0);
+    for (hsep_int i = 0; i < self->n; i++) {
+        corrected[i] = self->share * (best[i] - rest[i]);
+        best[i] = rest[i] + corrected[i];
+    }
+}
+
+/* Take the plan whose cost is lowest, of the averaged model's change of the last one a share; the physics model's was
+ * predicted last. */
 static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     const hsep_real of_physics = averaged_planner_cost(self, task, hsep_at(self, self->of_physics));
@@ -340,14 +377,13 @@ static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_ave
             self->paused = self->pause;
             self->pause *= 2;
         } else {
-            const hsep_real *last = hsep_at(self, self->rest);
-            hsep_real *best = hsep_at(self, self->best);
-            for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
-                best[j] = last[j] + self->share * (best[j] - last[j]);
-            }
+            averaged_planner_take(self, task->planner);
             plan = self->best;
             self->planned = 2;
         }
+    }
+    if (self->planned < 2) {
+        memset(hsep_at(self, self->corrected), 0, (size_t)self->n * sizeof(hsep_real));
     }
     averaged_planner_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
@@ -539,6 +575,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         averaged_planner_copy(self, of_physics, c);
         self->judges = self->judges && self->planned;
         self->follows = self->follows && self->planned;
+        averaged_planner_shift(self, self->Np / hsep_planner_splines(planner)->spacing);
 
         /* In place of the remainder of the last plan one that ends compensation, where it is off or pauses */
         self->cost_of_rest = self->cost;
@@ -663,9 +700,6 @@ HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hse
     self->follows = self->judges && best > 1 && self->paused == 0;
     self->ends = (best == 0 && was_planned > 0) || (self->judges && best > 1 && self->paused > 0);
     self->paused -= self->paused > 0;
-    const hsep_real n_rows = hsep_warm_start_n_rows(hsep_averaged_evidence(task->model, HSEP_MODEL_RESIDUAL));
-    const hsep_real n = n_rows / (hsep_real)self->Np;
-    self->share = 1.0 - HSEP_PLANNING_HELD_BACK * n / (n + HSEP_PLANNING_KNOWN);
     hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), 0); /* work follows from shares */
     const averaged_planner_work work = averaged_planner_work_of(self, task);
     /* This sample has cost that; what is learned at the end of the last window costs as much as commands of a plan */

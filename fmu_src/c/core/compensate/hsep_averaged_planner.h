@@ -50,7 +50,7 @@ typedef struct {
     hsep_real cost;         /* m2, of the best plan so far, */
     hsep_real cost_of_rest; /* and of the remainder of the last plan */
     hsep_real bound;        /* share of change_max that bounds the averaged model's plan */
-    hsep_real share;        /* of its change of the last plan that is taken */
+    hsep_real share;        /* of its change of the last plan that was taken last */
     hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
     hsep_real left;         /* and that this part and all after it nearly always take */
     /* Offsets in words from the beginning of the struct */
@@ -64,6 +64,7 @@ typedef struct {
     hsep_int e_h;        /* (preview + late + p,) m, and what the averaged model adds; behind it the last residuals */
     hsep_int target;     /* (preview,) m, work */
     hsep_int weight;     /* (preview,) of the errors of a plan: they count less at its end */
+    hsep_int corrected;  /* (n,) m, what that was; 0 of any other plan */
     hsep_int begins;     /* (m,) hsep_int, samples that the splines begin with, which are solved for */
     hsep_int shapes;     /* (HSEP_AVERAGED_SHAPES spacing,) splines of each distance of knots, one after the other, */
     hsep_int passed;     /* (HSEP_KNOTS_LEVELS, preview) and these behind G_pb */
@@ -74,7 +75,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 44);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 45);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
