@@ -244,7 +244,7 @@ RETRY = 0.5
 """Time for which the averaged model plans nothing after the first of its plans that ran away, s; twice as long after
 each further one of a run."""
 
-FASTER, UNPROVEN = 1.25, 0.5
+FASTER, _UNPROVEN = 1.25, 0.5
 """Speed of the preview, relative to the fastest motion that was learned, above which plans may change the command by
 this share of ``change_max`` only. ``change_max`` is to be twice the largest error without compensation, so this is that
 error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
@@ -310,7 +310,7 @@ class AveragedPlanning(Planning):
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, self.without_model(preview), scales)
         g, free = predictor.physics_operator(self.horizon)
-        change = UNPROVEN if model.outgrows(FASTER) else 1.0
+        change = _UNPROVEN if model.outgrows(FASTER) else 1.0
         of_physics_change = 1.0 if model.is_trained else change
         has_learned = predictor.k >= predictor.n_init and model.has_learned
         follows = has_learned and most is SepState.HYBRID and not self.paused

@@ -12,7 +12,7 @@ from ..base.metrics import ErrorSize, largest, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, CompensatorSettings, Limits
 from ..base.signals import Array
 from ..compensate.expected import Expected, expected_errors, limits_that_bind
-from ..compensate.planning import FASTER, UNPROVEN
+from ..compensate.planning import FASTER
 from ..cosim.inverse import FirInverse
 from ..identify.output_error import in_time
 from ..logs.checks import resolution
@@ -396,9 +396,7 @@ class Stretch:
     def expected(self, settings: CompensatorSettings, Np: int) -> Expected:
         """Return the errors to be expected with a compensator's settings and ``Np`` samples in a window."""
         known = replace(self.machine.compensator_predictor, Np=Np, p=1, q=0, measurement_delay=0)
-        # Half of a bound is for motion that has not been learned, as here
-        most = None if settings.change_max is None else settings.change_max / UNPROVEN
-        physics, pair = replace(settings, compensate="physics", change_max=most), (self.x_d, self.x)
+        physics, pair = replace(settings, compensate="physics"), (self.x_d, self.x)
         (found,) = expected_errors(self.machine.model, known, physics, [pair], learn=False)
         return Expected(*(signal[self.judged] for signal in found))
 
