@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.errors import ParameterError, SignalError
-from ..base.settings import CompensatorSettings, PredictorSettings, samples_before
+from ..base.settings import CompensatorSettings, samples_before
 from ..base.signals import as_measured, as_published, as_samples
 from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..base.threads import one_blas_thread
@@ -32,10 +32,6 @@ from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Pr
 from .qp import DriveBounds
 from .splines import N_DECIDED, SplineBasis
 from .stop import Stop
-
-RECOMMENDED = PredictorSettings(averaging=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1)
-"""Predictor settings of the paper's model with the smallest tracking error on the staircase drive, with the
-compensator's defaults."""
 
 _KIND = "compensator"
 _TUNABLE = tuple(name for name, parameter in CompensatorSettings.parameters().items() if parameter.tunable)
@@ -65,6 +61,7 @@ class SepCompensator:
     """
 
     _SAVED = ("lead_in", "_state_before", "monitor", "_previous_plan", "_last_stop", "_delta_before", "_x_d_before")
+    _SAVED_OF_PLANNING = ("paused", "pause", "ahead", "share", "corrected")
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         Np = predictor.Np
@@ -252,9 +249,11 @@ class SepCompensator:
         return pack(_KIND, meta, arrays, {"predictor": self.predictor.to_bytes()})
 
     def _saved(self) -> tuple[Any, ...]:
-        planning = self._planning
-        of_planning = planning.paused, planning.pause, planning.ahead, planning.share, planning.corrected
-        return *(getattr(self, name) for name in self._SAVED), *of_planning
+        return tuple(getattr(owner, name) for owner, name in self._owners())
+
+    def _owners(self) -> list[tuple[object, str]]:
+        of_planning = [(self._planning, name) for name in self._SAVED_OF_PLANNING]
+        return [*((self, name) for name in self._SAVED), *of_planning]
 
     @classmethod
     def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> "SepCompensator":
@@ -271,11 +270,8 @@ class SepCompensator:
             plan, stop = compensator._previous_plan, compensator._last_stop
             pending = PendingPlan(plan, nothing, nothing, stop, SepState.OFF, False, 1.0, plan)
             like = compensator._saved(), pending if meta["is_planned"] else ()
-            planning = compensator._planning
-            (*saved, paused, pause, ahead, share, corrected), found = restored(like, arrays)
-            planning.paused, planning.pause, planning.ahead = paused, pause, ahead
-            planning.share, planning.corrected = share, corrected
-            for name, value in zip(cls._SAVED, saved, strict=True):
-                setattr(compensator, name, value)
+            saved, found = restored(like, arrays)
+            for (owner, name), value in zip(compensator._owners(), saved, strict=True):
+                setattr(owner, name, value)
             compensator._pending = found or None
         return compensator

@@ -44,7 +44,7 @@ class PendingPlan:
     state: SepState  # model of the plan
     runs_away: bool  # whether the residual model's plan ran away, so that it plans none for a time
     share: float  # of the residual model's change of the last plan that is taken
-    correction: Array  # (3 + n_free,), m: what was taken; 0 of any other plan
+    correction: Array  # (3 + n_free,), m: what is taken, before a stop shortens the plan; 0 of any other plan
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Planning(ABC):
     # half a plan before it, the last one by this window's; NaN where nothing is known; with the paper's model none
     ahead: Array
     share: float  # of the residual model's change of a plan that was taken last
-    corrected: Array  # (3 + n_free,), m: what that was, in the remainder of the last plan
+    corrected: Array  # (3 + n_free,), m: ``correction`` of the last plan, by the splines of the next one
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         self.basis, self.bounds, self.settings, self.Np = basis, bounds, settings, Np
@@ -354,7 +354,7 @@ class AveragedPlanning(Planning):
         """Return which share of a change of the last plan, both ``(3 + n_free,)``, m, is taken."""
         near = slice(N_DECIDED + self.n_pinned, N_DECIDED + _NEAR * (self.Np // self.spacing))
         now, before, plan = change[near], self.corrected[near], plan[near]
-        size = math.sqrt(float(now @ now) * float(before @ before))
+        size = math.sqrt(float(now @ now)) * math.sqrt(float(before @ before))
         cosine = float(now @ before) / size if size > _UNCHANGED * float(plan @ plan) else 0.0
         return min(max(self.share * (1.0 + _TAKEN_BACK * cosine), _LEAST_SHARE), 1.0)
 

@@ -80,7 +80,7 @@ def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
 
 
 def held_for(x_d: Array) -> int:
-    """Return for how many samples each command is held."""
+    """Return for how many samples each command is held, or rounded to the same."""
     intervals = np.diff(np.flatnonzero(np.diff(x_d)))
     return int(np.quantile(intervals, _HELD)) if len(intervals) > _STEPS else 1
 
@@ -221,9 +221,9 @@ class LookAheads:
         now = next(one for one in self.tried if one.preview == self.chosen)
         if (shortest := self.shortest) != self.chosen:
             return [
-                f"Where the model is right, plans leave no more with --look-ahead {1e3 * shortest * self.T_s:.4g}ms: "
-                "they need less of the command ahead, and follow younger measurements in shorter windows, at more work "
-                "in a sample (up to three times)."
+                "Where the model is right, plans leave as little or less with --look-ahead "
+                f"{1e3 * shortest * self.T_s:.4g}ms: they need less of the command ahead, and follow younger "
+                "measurements in shorter windows, at more work in a sample (up to three times)."
             ]
         if (longer := self.longer(now)) is None:
             return []
@@ -253,7 +253,7 @@ class Tracking:
     duration: float  # of the samples that are tried, of a long log from its beginning, s
     largest: float  # servo error of the whole logs, m
     motion: Mapping[str, Sequence[float]]  # name of a limit → largest of the logs' commands, and the drive's, SI
-    held: int  # samples for which each command is held
+    held: int  # samples for which each command is the same
     look_aheads: LookAheads | None  # None where the model has no error to compensate
 
     def lines(self, shown: DisplayUnits) -> list[str]:
@@ -284,8 +284,8 @@ class Tracking:
             )
         if self.held > 1:
             lines.append(
-                f"The log's commands are held for {self.held} samples each; where their steps exceed a limit, that "
-                "bounds what the compensator adds."
+                f"The log's commands are held, or rounded to the same, for {self.held} samples each; where their steps "
+                "exceed a limit, that bounds what the compensator adds."
             )
         factor, unit = shown.position
         for power, (name, sizes) in zip(("", "²", "³"), self.motion.items(), strict=False):

@@ -78,7 +78,8 @@ def beginnings(recordings: Sequence[Recording], n_most: int) -> list[Recording]:
     found = []
     for one in recordings:
         end, moving = max(n_most * len(one.x) // n, 2), np.flatnonzero(np.diff(one.x_d))
-        rest = max(0, min(int(moving[0]) if len(moving) else 0, len(one.x) - end) - end // 20)
+        rest = int(moving[0]) - end // 20 if len(moving) else 0
+        rest = max(0, min(rest, len(one.x) - end, one.n_train - end // 2))
         counts = (max(count - rest, 0) for count in (one.n_train, one.n_settling))
         one = Recording(one.x_d[rest:], one.x[rest:], *counts)
         at_rest = np.flatnonzero(np.diff(one.x_d[3 * end // 4 : end]) == 0.0)

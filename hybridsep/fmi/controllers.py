@@ -26,7 +26,6 @@ from .weights import WEIGHTS_FILE
 
 COMPONENTS = {"SepCompensator": "hsep", "HybridPredictor": "hsep_predictor"}  # name of the component of each model
 
-
 _NAME_MAX = 47 - len("..look-ahead")  # letters of component and axis together: HAL's 47, less the longest pin's
 
 

@@ -236,7 +236,8 @@ class _Channel:
 
 def channels(source: Source) -> list[_Channel]:
     """Return a file's columns with their units and roles, as far as they can be told; LogError if it has no names."""
-    _check_names(source)
+    if source.names != [str(i) for i in range(len(source.names))]:  # as tables call them
+        _check_names(source)
     roles: dict[str | None, str] = {}
     with suppress(LogError):  # there are several
         pair = _positions(source, {}, None)[0]

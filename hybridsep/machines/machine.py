@@ -163,15 +163,18 @@ class Machine(FileSection):
         """Return a compensator, by :attr:`compensator_settings` and :attr:`compensator_predictor` if left out.
 
         ``trained``: predictor of this machine, such as ``HybridPredictor.load("trained.state")`` that ``fit`` wrote,
-        with whose weights it begins; its windows may be others than the compensator's. StateError if it is another
-        machine's.
+        with whose weights it begins, without a warm-up; its windows may be others than the compensator's. StateError
+        if it is another machine's, or has learned nothing.
         """
         from ..compensate.compensator import SepCompensator
 
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
         if trained is not None:
             own.begin_with(trained)
-        return SepCompensator(own, self._compensation() if settings is None else settings)
+        compensator = SepCompensator(own, self._compensation() if settings is None else settings)
+        if trained is not None:
+            compensator.restart()  # without a warm-up
+        return compensator
 
     def new_plant(self, **changes: float | str) -> FeedDrive | StageDrive:
         """Return the plant; ``changes`` are values of its own section, such as ``c_nl`` or ``kappa``.

@@ -142,7 +142,10 @@ class HybridPredictor:
 
     def differences(self, trained: "HybridPredictor") -> list[str]:
         """Return, in words, what must not differ in a predictor whose weights this one takes; its window may."""
-        found, expected = ({**one.learned_with, "input_hold": one.settings.input_hold} for one in (trained, self))
+        found, expected = (
+            {**one.learned_with, "input_hold": one.settings.input_hold, "disturbances": len(one.disturbances)}
+            for one in (trained, self)
+        )
         return [
             f"{name} = {found.get(name, 'none')} instead of {expected.get(name, 'none')}"
             for name in {**expected, **found}
@@ -157,10 +160,13 @@ class HybridPredictor:
     def begin_with(self, trained: "HybridPredictor") -> None:
         """Begin a run at rest with what another predictor has learned, such as one of longer windows.
 
-        StateError, naming all that differs, if that was learned with another model or with other features.
+        StateError, naming all that differs, if that was learned with another model or other features, or if it has
+        learned nothing.
         """
         if differing := self.differences(trained):
-            raise StateError(f"the predictor was trained for another one: it has {', '.join(differing)}")
+            raise StateError(f"the trained predictor must have this model and features: it has {', '.join(differing)}")
+        if trained.regression.n_rows == 0:
+            raise StateError("the trained predictor has learned no sample")
         self.take_over(trained.residual.learned, trained.state.uncertainty, trained.residual.regressions)
         self.restart()
 

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from compensator_cases import DRIVE_LIMITS, MODEL, beyond, closed, compensator, move, turned
+from compensator_cases import DRIVE_LIMITS, MODEL, RECOMMENDED, beyond, closed, compensator, move, turned
 
 from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.settings import CompensatorSettings, PredictorSettings
-from hybridsep.compensate.compensator import RECOMMENDED, SepCompensator
+from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.model.physics import ModalModel
 from hybridsep.online.look_ahead import SepState
 from hybridsep.plants.feed_drive import FeedDrive

@@ -86,7 +86,7 @@ def test_what_is_returned_predicts_compensates_and_shows_itself(axis: Fit, tmp_p
     restore_weights(as_in_fmus, weights_file(axis.predictor()))
     assert hybridsep.SepCompensator(as_in_fmus, compensator.settings).to_bytes() == compensator.to_bytes()
     with pytest.raises(
-        StateError, match=r"was trained for another one: it has .*mode\[1\]\.zeta = 1\.0 instead of 0\.0499"
+        StateError, match=r"must have this model and features: it has .*mode\[1\]\.zeta = 1\.0 instead of 0\.0499"
     ):
         drive.new_compensator(trained=axis.predictor())
     off, hybrid = (hybridsep.cosimulate(axis.compensator(how), plant, log).tracking_rms for how in ("off", "hybrid"))

@@ -47,6 +47,9 @@ def test_what_is_tried_of_a_long_log_is_its_beginning_to_where_it_rests() -> Non
     x_d[80:86] = 80.0
     [one] = beginnings([Recording(x_d, x_d + 1, 500)], 100)
     np.testing.assert_array_equal(one.x_d, x_d[:86])
+    for rest, first, n_train in ((300, 294, 50), (700, 450, 50), (1000, 0, 50)):  # as much of it as leaves training
+        [one] = beginnings([Recording(np.maximum(x_d, x_d[rest - 1]), x_d, 500)], 100)
+        assert (one.x[0], one.n_train) == (first, n_train)
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.0])

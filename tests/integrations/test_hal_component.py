@@ -25,7 +25,6 @@ PREVIEW = ("compensator.preview=60",)  # look-ahead in the tests, periods: short
 V, A = 0.25, 2.5e-3  # its limits, mm a period and mm a period²
 FOLLOWS = 0.15  # share of its distance to the command that the simulated drive goes in a period
 
-
 OUT, DELAYED, FB_JOINT, PREDICTED, ERROR, STD, STATE = range(7)
 """Columns of what a component writes; positions in machine units."""
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from compensator_cases import RECOMMENDED
 
 from hybridsep import Encoder, Limits, load_machine, machine_names, simulate, spiral
 from hybridsep.base.errors import MachineError
 from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
-from hybridsep.compensate.compensator import RECOMMENDED
 from hybridsep.machines.machine import Machine, machine_from_table, machine_path, machine_text
 from hybridsep.machines.sections import Physics, SpringMassDamper, StageSection
 

@@ -119,7 +119,6 @@ def test_real_poles_in_any_number(zeros: list[float], poles: list[complex]) -> N
 
 UNSTABLE = control.tf([1.0], [1.0, -1.0, 3.0])
 
-
 REFUSED: list[tuple[Any, str]] = [
     (UNSTABLE, "G_pb must be stable, got a pole at 0.5"),
     (control.tf([1.0], [1.0, 0.0]), "G_pb must be stable, got a pole at 0"),

@@ -26,7 +26,6 @@ from hybridsep.predict.window import Prediction
 
 NUMERATOR, DENOMINATOR = np.array([staircase.C, staircase.K]), np.array([staircase.M, staircase.C, staircase.K])
 
-
 PAPER: dict[str, Any] = {"T_s": 1e-3, "Np": 100, "p": 50, "q": 3, "lam": 1e-12, "t_init": 0.3}
 
 

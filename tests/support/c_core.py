@@ -25,7 +25,6 @@ TS = 1e-3  # s
 EXPOSE = ROOT / "tests" / "c" / "expose.c"
 MESSAGE_SIZE = 512
 
-
 TABLES: dict[str, FmuTable] = {}
 """Tables of models that are no machine's FMU, by name."""
 

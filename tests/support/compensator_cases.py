@@ -17,11 +17,8 @@ from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 from hybridsep.predict.predictor import HybridPredictor
 
 MODEL = ModalModel.spring_mass_damper(1.0, 15.7, 24674.0)
-
-
+RECOMMENDED = PredictorSettings(averaging=False, Np=50, p=50, q=40, lam=1e-8, t_init=0.1)  # of the paper's model
 DRIVE_LIMITS = Limits(0.1, 16.0, 5000.0)
-
-
 TS = 1e-3
 
 

@@ -11,7 +11,6 @@ from .experts import ARX_COMMAND, ARX_RESIDUAL, EXPERTS, RECALL, STATIC, Expert,
 
 _LEAST_SQUARE = 1e-300  # mean square, m², that counts as 0
 
-
 _ROUNDING = 1e-6  # what rounding may have added to the sum of the weights
 
 

@@ -334,7 +334,7 @@ static int averaged_planner_runs_away(const hsep_averaged_planner *self, const h
 static void averaged_planner_shift(hsep_averaged_planner *self, hsep_int kept)
 {
     hsep_real *corrected = hsep_at(self, self->corrected);
-    const hsep_int left = self->follows && kept < self->n ? self->n - kept : 0;
+    const hsep_int left = self->follows ? self->n - kept : 0;
     memmove(corrected, corrected + (self->n - left), (size_t)left * sizeof(hsep_real));
     memset(corrected + left, 0, (size_t)(self->n - left) * sizeof(hsep_real));
 }
@@ -354,7 +354,7 @@ static void averaged_planner_take(hsep_averaged_planner *self, const hsep_planne
         before += corrected[i] * corrected[i];
         plan += rest[i] * rest[i];
     }
-    const hsep_real size = hsep_sqrt(now * before);
+    const hsep_real size = hsep_sqrt(now) * hsep_sqrt(before);
     const hsep_real cosine = size > HSEP_PLANNING_UNCHANGED * plan ? product / size : 0.0;
     self->share = hsep_fmax(self->share * (1.0 + HSEP_PLANNING_TAKEN_BACK * cosine), HSEP_PLANNING_LEAST_SHARE);
     self->share = hsep_fmin(self->share, 1.0);

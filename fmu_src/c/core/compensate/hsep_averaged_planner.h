@@ -3,7 +3,8 @@
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
  * delta. Each of at most three Gauss-Newton steps solves the quadratic programme of the linearised model, and goes
  * towards its minimum as far as lowers the cost. Once it has learned, the averaged model judges all plans: its own, the
- * physics model's, and the remainder of the last one; the best is taken. Where its own asks for a larger change than
+ * physics model's, and the remainder of the last one; the best is taken, of its own change of the last one a share.
+ * Where its own asks for a larger change than
  * compensation is made for, it is wrong, and plans none for a time, which doubles; a plan that ends compensation stands
  * for the remainder then, and is followed where compensation is off.
  *
@@ -64,7 +65,7 @@ typedef struct {
     hsep_int e_h;        /* (preview + late + p,) m, and what the averaged model adds; behind it the last residuals */
     hsep_int target;     /* (preview,) m, work */
     hsep_int weight;     /* (preview,) of the errors of a plan: they count less at its end */
-    hsep_int corrected;  /* (n,) m, what that was; 0 of any other plan */
+    hsep_int corrected;  /* (n,) m, what the averaged model's last plan changed the one before by; 0 of any other */
     hsep_int begins;     /* (m,) hsep_int, samples that the splines begin with, which are solved for */
     hsep_int shapes;     /* (HSEP_AVERAGED_SHAPES spacing,) splines of each distance of knots, one after the other, */
     hsep_int passed;     /* (HSEP_KNOTS_LEVELS, preview) and these behind G_pb */
