@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from ..base.signals import Array
-from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, ExpertPrediction, SolvedExpert
+from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, SolvedExpert
 from ..predict.averaging.features import N_FRICTION, N_LASTING, N_STOPS, StaticFeatures, StaticState
 from ..predict.averaging.model import AveragedForecast, AveragedModel
 from ..predict.window import ResidualWindow
@@ -159,7 +159,10 @@ class PlanModel:
             weight = weights[expert.place]
             if weight == 0.0:
                 continue
-            shrinkage = weight * _left(at.predictions[expert])[n_late:, None]
+            prediction = at.predictions[expert]
+            left = prediction.shrinkage.copy()  # what shrinking and bounds leave of it
+            np.divide(prediction.e_h, prediction.unshrunk, out=left, where=prediction.unshrunk != 0.0)
+            shrinkage = weight * left[n_late:, None]
             if expert.like(self._model).target == COMMAND_RESIDUAL:
                 # As late as the command's expert takes them
                 acted = np.pad(changes, ((self._model.command.dead_time, 0), (0, 0)))[: len(changes)]
@@ -232,12 +235,6 @@ def slopes_of(
         np.hstack([np.empty((len(x), 0)), *of_position]),
         of_velocity,
     )
-
-
-def _left(prediction: ExpertPrediction) -> Array:
-    """Return what shrinking and bounds leave of a prediction, ``(n,)``."""
-    unshrunk = prediction.unshrunk
-    return np.asarray(np.divide(prediction.e_h, unshrunk, out=prediction.shrinkage.copy(), where=unshrunk != 0.0))
 
 
 TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, 5, 100.0)

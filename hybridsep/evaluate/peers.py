@@ -125,16 +125,13 @@ class ArxRun:
         ``w``, (2 n + 2,): coefficients; ``begin``, ``end``: samples; ``begin`` never falls from call to call.
         """
         known = max(begin - self._delay, 0)
-        self._bridge(w, known)
-        return self._free_run(w, known, end)[begin - known :]
-
-    def _bridge(self, w: Array, end: int) -> None:
-        """Fill what is missing before ``end`` by free runs from what was measured before."""
-        missing = np.isnan(self._y[self._n_filled : end])
+        # What is missing before is filled by free runs from what was measured before it
+        missing = np.isnan(self._y[self._n_filled : known])
         edges = np.flatnonzero(np.diff(missing, prepend=False, append=False)) + self._n_filled
         for first, last in edges.reshape(-1, 2).tolist():
             self._filled[self.n + first : self.n + last] = self._free_run(w, first, last)
-        self._n_filled = max(self._n_filled, end)
+        self._n_filled = max(self._n_filled, known)
+        return self._free_run(w, known, end)[begin - known :]
 
     def _free_run(self, w: Array, begin: int, end: int) -> Array:
         n = self.n

@@ -32,7 +32,14 @@ def begun_report(title: str, logs: Sequence[Log], judged: Judged, heading: str, 
     names, look_ahead = ", ".join(log.path.name for log in logs), 1e3 * Np * judged.T_s
     report = Report(title, f"{names} · {extent(logs)} · look-ahead {Np} samples, {look_ahead:.4g} ms")
     report.paragraph(advice_on(judged), "verdict")
-    _write_figures(report, judged, heading, how)
+    report.heading(heading)
+    report.table(*judged.figures())
+    report.paragraph(
+        f"{how} Each window was predicted before any of its samples was known, as in the machine. "
+        f"{peers_in_words(judged)}",
+        "dim",
+    )
+    report.bullets(line.rstrip(".") for line in str(judged.replay.verdict()).splitlines())
     if said := judged.of_the_controller():
         report.heading(OF_ITSELF)
         report.bullets(said)
@@ -171,17 +178,6 @@ def write_settings(report: Report, choice: Sequence[Tried], judged: Judged) -> N
         f"unless another is better by {100 * WORTH:g} %.",
         "dim",
     )
-
-
-def _write_figures(report: Report, judged: Judged, title: str, how: str) -> None:
-    report.heading(title)
-    report.table(*judged.figures())
-    report.paragraph(
-        f"{how} Each window was predicted before any of its samples was known, as in the machine. "
-        f"{peers_in_words(judged)}",
-        "dim",
-    )
-    report.bullets(line.rstrip(".") for line in str(judged.replay.verdict()).splitlines())
 
 
 def _write_time(report: Report, judged: Judged) -> None:

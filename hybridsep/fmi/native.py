@@ -14,7 +14,6 @@ import struct
 from collections.abc import Sequence
 
 from ..base.files import data_folder
-from ..base.signals import Array
 from ..base.version import __version__
 from ..plants.trajectory import spiral, staircase
 from .c_header import FMI_HEADERS, TABLE_FILE, c_header, c_sources, fmi_headers, table_file
@@ -50,7 +49,12 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
     else:
         content["model.png"] = icon(model)
     if model == "ReferenceTrajectory":
-        content |= {f"resources/{file}": data for file, data in _trajectories(spec.machine.T_s, spec.samples).items()}
+        T_s = spec.machine.T_s
+        # NumPy's sine differs by 0.1 fm from one version or processor to another: rounded to 10 pm, archives are alike
+        played = [staircase(T_s), *(axis.round(11) for axis in spiral(T_s))]
+        for n, x_d in enumerate(played if spec.samples is None else [*played, spec.samples]):
+            binary = _TRAJECTORY_MAGIC + struct.pack("<Qd", len(x_d), T_s) + x_d.astype("<f8").tobytes()
+            content[f"resources/trajectory_{n}.bin"] = binary
     if spec.weights is not None:
         content[f"resources/{WEIGHTS_FILE}"] = spec.weights
     reference = reference_run(spec)
@@ -83,19 +87,4 @@ def _licenses() -> dict[str, bytes]:
         "license.txt": (folder.parent / "LICENSE").read_bytes(),
         "fmi-headers.txt": ("\n".join(lines).rstrip("\n") + "\n").encode(),
         "compiler-runtime.txt": filled("compiler_runtime.txt", zig=zig, mingw=mingw).encode(),
-    }
-
-
-def _trajectories(T_s: float, samples: Array | None) -> dict[str, bytes]:
-    """Return ``trajectory_<n>.bin`` of the staircase, the spiral's axes and, if there are some, the user's samples.
-
-    The spiral is rounded to 10 pm: NumPy's sine differs by 0.1 fm from one version or processor to another, and the
-    archive would be another one.
-    """
-    played = [staircase(T_s), *(axis.round(11) for axis in spiral(T_s))]
-    if samples is not None:
-        played.append(samples)
-    return {
-        f"trajectory_{n}.bin": _TRAJECTORY_MAGIC + struct.pack("<Qd", len(x_d), T_s) + x_d.astype("<f8").tobytes()
-        for n, x_d in enumerate(played)
     }

@@ -128,12 +128,6 @@ def _hindrance(segments: Sequence[Segment]) -> str:
     return ""
 
 
-def _as_known(value: float, std: float) -> str:
-    """Return a figure with the decimals of the two leading digits of its standard deviation, seven at most."""
-    decimals = 1 - math.floor(math.log10(std)) if 0.0 < std < math.inf else 7
-    return f"{value:.{min(max(decimals, 0), 7)}f}"
-
-
 def _spread(segments: Sequence[Segment]) -> float:
     """Return the standard deviation of the commanded position, m."""
     return float(np.sqrt(np.mean(np.concatenate([(s.u - s.u.mean()) ** 2 for s in segments]))))
@@ -180,7 +174,9 @@ def _findings(
         )
     gain = float(fit.structure.gains(fit.linear)[0].sum())
     if not fit.structure.unit_gain:
-        findings.append(f"the static gain is {_as_known(gain, gain_std)} ± {gain_std:.2g}")
+        # The decimals of the two leading digits of the standard deviation, seven at most
+        decimals = 1 - math.floor(math.log10(gain_std)) if 0.0 < gain_std < math.inf else 7
+        findings.append(f"the static gain is {gain:.{min(max(decimals, 0), 7)}f} ± {gain_std:.2g}")
     if fit.structure.order and chosen.rms_held_out > 2 * chosen.fit.rms:
         findings.append(
             f"the error on the part that was held out, {shown.words(chosen.rms_held_out)}, is "

@@ -142,7 +142,9 @@ class _Problem:
         """Return residual, linear parameters and mean offset for one set of poles."""
         blocks = [self._projected(theta, u, y, rows) for u, y, rows in self._data]
         Phi, target = (np.concatenate(parts) for parts in zip(*((b[0], b[1]) for b in blocks), strict=True))
-        linear = _least_squares(Phi, target)
+        norms = np.linalg.norm(Phi, axis=0)
+        norms[norms == 0] = 1.0
+        linear: Array = np.linalg.lstsq(Phi / norms, target, rcond=1e-12)[0] / norms  # with columns of unit norm
         offset = float(np.mean([target - columns @ linear for _, _, target, columns in blocks]))
         return target - Phi @ linear, linear, offset
 
@@ -227,13 +229,3 @@ def simulated(fit: Fit, segment: Segment, T_s: float) -> Array:
     columns = responses(fit.structure, sections, u)
     gains, betas = fit.structure.gains(fit.linear)
     return columns @ np.concatenate((gains, betas if fit.structure.zero else []))
-
-
-def _least_squares(Phi: Array, target: Array) -> Array:
-    """Return the least-squares solution with columns scaled to unit norm."""
-    if Phi.shape[1] == 0:
-        return np.empty(0)
-    norms = np.linalg.norm(Phi, axis=0)
-    norms[norms == 0] = 1.0
-    solution: Array = np.linalg.lstsq(Phi / norms, target, rcond=1e-12)[0] / norms
-    return solution

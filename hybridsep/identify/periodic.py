@@ -53,7 +53,10 @@ def residual_period(pieces: Iterable[tuple[Array, Array]], model: ModalModel, T_
     lowest, highest = _PERIODS_MIN / travel, 1.0 / (SAMPLES_MIN * fastest)
     if highest <= lowest:
         return 0.0
-    known = _baseline(s, v, a)
+    # What else a residual follows, scaled: offset, stiffness, friction, wrong lag and inertia
+    x = (s - s.mean()) / travel
+    moving = [np.sign(v), v / np.abs(v).max(), a / max(float(np.abs(a).max()), 1e-300)]
+    known = np.column_stack((np.ones(len(s)), x, x**2, *moving))
     rest = without(known, e)
     n_lines = int(min(_LINES_MAX, _OVERSAMPLED * travel * (highest - lowest) + 2))
     lines = lowest + np.arange(n_lines) / (_OVERSAMPLED * travel)
@@ -68,13 +71,6 @@ def residual_period(pieces: Iterable[tuple[Array, Array]], model: ModalModel, T_
     if best <= lowest * (1.0 + 1e-3) or _predicted(s, known, e, best) < PREDICTED:
         return 0.0
     return _rounded(1.0 / best, _RESOLVED / (best**2 * travel))
-
-
-def _baseline(s: Array, v: Array, a: Array) -> Array:
-    """Return what else a residual follows, scaled: offset, stiffness, friction, wrong lag and inertia, ``(n, 6)``."""
-    x = (s - s.mean()) / np.ptp(s)
-    moving = [np.sign(v), v / np.abs(v).max(), a / max(float(np.abs(a).max()), 1e-300)]
-    return np.column_stack((np.ones(len(s)), x, x**2, *moving))
 
 
 def _predicted(s: Array, known: Array, e: Array, line: float) -> float:

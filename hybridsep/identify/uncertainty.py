@@ -93,7 +93,15 @@ def _named(fit: Fit, covariance: Array, T_s: float, unit: str) -> tuple[Estimate
     point = np.concatenate((fit.theta, fit.linear))
 
     def values(parameters: Array) -> Array:
-        return _physical(fit, parameters[:n_theta], parameters[n_theta:], T_s)
+        theta, linear = parameters[:n_theta], parameters[n_theta:]
+        gains = fit.structure.gains(linear)[0]
+        physical = [gains.sum()]
+        if fit.structure.order:
+            for mode in fit.structure.modes(theta, linear, T_s)[: fit.structure.n_modes]:
+                physical += [mode.f_n, mode.zeta, mode.alpha, mode.beta]
+        if fit.structure.lag:
+            physical += [np.exp(-theta[-1]), gains[-1]]
+        return np.array(physical)
 
     slopes = _differences(values, point) if point.size else np.zeros((len(values(point)), 0))
     inner = covariance[: n_theta + n_linear, : n_theta + n_linear]
@@ -113,18 +121,6 @@ def _names(fit: Fit) -> list[tuple[str, str]]:
     for i in range(fit.structure.n_modes):
         names += [(f"mode[{i + 1}].{name}", unit) for name, unit in units.items()]
     return names + [("lag.tau", "s"), ("lag.gain", "1")] * fit.structure.lag
-
-
-def _physical(fit: Fit, theta: Array, linear: Array, T_s: float) -> Array:
-    gains = fit.structure.gains(linear)[0]
-    values = [gains.sum()]
-    if fit.structure.order:
-        modes = fit.structure.modes(theta, linear, T_s)
-        for mode in modes[: fit.structure.n_modes]:
-            values += [mode.f_n, mode.zeta, mode.alpha, mode.beta]
-    if fit.structure.lag:
-        values += [np.exp(-theta[-1]), gains[-1]]
-    return np.array(values)
 
 
 def _differences(function: Callable[[Array], Array], point: Array) -> Array:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.errors import LogError, SignalError, brief, first_line
 from ..base.signals import Array, Given, check_same_index, given_column, index_values
@@ -35,17 +34,6 @@ def _reading(path: Path, format_: str, what: str = "") -> Iterator[None]:
         why = name if isinstance(error, _OWN) else first_line(f"{name}: {error}")
         subject = f"{what} is" if what else "is"
         raise LogError(f"{path}: {subject} truncated, damaged or not {format_}: {why}") from error
-
-
-def _check(path: Path, name: str, values: NDArray[Any]) -> None:
-    """Raise LogError unless the values of a column are real numbers, in a vector, one row or one column."""
-    shape, dtype = values.shape, values.dtype
-    if dtype.kind == "c":
-        raise LogError(f"{path}: column {brief(name)} must be real, got complex numbers ({dtype})")
-    if dtype.kind not in "fiu":
-        raise LogError(f"{path}: column {brief(name)} must be numbers, got {dtype}")
-    if len(shape) != 1 and not (len(shape) == 2 and {0, 1}.intersection(shape)):
-        raise LogError(f"{path}: column {brief(name)} must have shape (n,), (n, 1) or (1, n), got {brief(shape)}")
 
 
 def _by_columns(arrays: Mapping[str, Any]) -> dict[str, Any]:
@@ -90,7 +78,13 @@ class _GivenSource(ArraysSource):
         values = self._given[name].values
         if name in self.stamps:
             values = (values - values[:1]) / np.timedelta64(1, "s")
-        _check(self.path, name, values)
+        shape, dtype, must = values.shape, values.dtype, f"{self.path}: column {brief(name)} must"
+        if dtype.kind == "c":
+            raise LogError(f"{must} be real, got complex numbers ({dtype})")
+        if dtype.kind not in "fiu":
+            raise LogError(f"{must} be numbers, got {dtype}")
+        if len(shape) != 1 and not (len(shape) == 2 and {0, 1}.intersection(shape)):
+            raise LogError(f"{must} have shape (n,), (n, 1) or (1, n), got {brief(shape)}")
         return values.astype(np.float64).ravel()
 
 

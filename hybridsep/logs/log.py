@@ -152,7 +152,13 @@ def read_log(
         If the file, its columns or its times cannot be used.
     """
     given = check_reading(unit, T_s)
-    source = _opened(recording)
+    if isinstance(recording, str | Path):
+        source: Source = open_source(Path(recording))
+    elif is_table(recording):
+        source = TableSource(recording)
+    else:
+        got = type(recording).__name__
+        raise LogError(f"a log is a file, a mapping of columns or a table, got {got}; x beside x_d?")
     path = source.path
     chosen = choose_columns(source, columns, unit, axis=axis, time_needed=given is None)
     source.commanded, source.measured = chosen["x_d"].name, chosen["x"].name
@@ -204,15 +210,6 @@ def is_table(given: Any) -> bool:
     return not isinstance(given, Log) and (
         isinstance(given, Mapping) or bool(fields) or any(hasattr(given, mark) for mark in marks)
     )
-
-
-def _opened(recording: Any) -> Source:
-    """Return the columns of a file, or of what is in memory."""
-    if isinstance(recording, str | Path):
-        return open_source(Path(recording))
-    if is_table(recording):
-        return TableSource(recording)
-    raise LogError(f"a log is a file, a mapping of columns or a table, got {type(recording).__name__}; x beside x_d?")
 
 
 def _checked(path: Path, block: Block, columns: Mapping[str, Column]) -> dict[str, Array]:

@@ -347,7 +347,14 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
                 score = (n, width - (delimiter is None and bool(table.clocks)))
                 if best is None or score > best[0]:
                     best = (score, table)
-    return _only_names(lines) if best is None else best[1]
+    if best is not None:
+        return best[1]
+    known = [(number, line) for number, line in lines if not line.lstrip().startswith(_COMMENTS)] or list(lines)
+    if not known:
+        return None
+    number, line = known[0]
+    mark = next((mark for mark in _DELIMITERS if mark and mark in line), None)
+    return _Table(_names(line, mark), {}, mark, ".", number, number + 1, set())
 
 
 def _width(fields: Sequence[str]) -> int:
@@ -420,16 +427,6 @@ def _kind(cells: Sequence[str]) -> str:
     """Return which timestamps most cells of a column are, empty if they are none."""
     ((kind, n),) = Counter(map(stamp_kind, cells)).most_common(1)
     return kind if 2 * n > len(cells) else ""
-
-
-def _only_names(lines: Sequence[tuple[int, str]]) -> _Table | None:
-    """Return the table whose names are in the first line that is no comment."""
-    known = [(number, line) for number, line in lines if not line.lstrip().startswith(_COMMENTS)] or list(lines)
-    if not known:
-        return None
-    number, line = known[0]
-    delimiter = next((mark for mark in _DELIMITERS if mark and mark in line), None)
-    return _Table(_names(line, delimiter), {}, delimiter, ".", number, number + 1, set())
 
 
 def _names(line: str, delimiter: str | None) -> list[str]:

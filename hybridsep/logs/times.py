@@ -60,7 +60,11 @@ def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated
 
     LogError if the times never increase, their unit is unknown, they are too coarse, or another interval was given.
     """
-    coarse = _is_coarse(times)
+    single = times.astype(np.float32)
+    # Numbers of single precision that do not resolve the interval
+    coarse = np.array_equal(single, times) and (
+        float(np.spacing(np.abs(single).max())) > _RESOLVED * abs(float(times[-1] - times[0])) / (len(times) - 1)
+    )
     t, remarks = _unwrapped(times * factor)
     steps = np.diff(t)
     if not (steps > 0.0).any():
@@ -109,14 +113,6 @@ def _unwrapped(t: Array) -> tuple[Array, tuple[str, ...]]:
             many = "once" if len(wraps) == 1 else f"{len(wraps)} times"
             remarks.append(f"the time wraps {many}, after {what}: unwrapped")
     return t, tuple(remarks)
-
-
-def _is_coarse(times: Array) -> bool:
-    """Return whether times are numbers of single precision that do not resolve the interval."""
-    single = times.astype(np.float32)
-    if not np.array_equal(single, times):
-        return False
-    return float(np.spacing(np.abs(single).max())) > _RESOLVED * abs(float(times[-1] - times[0])) / (len(times) - 1)
 
 
 def _rows(path: Path, name: str, t: Array, given: float | None, remarks: tuple[str, ...]) -> Times:

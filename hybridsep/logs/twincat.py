@@ -63,7 +63,12 @@ class TwinCatSource(ArraysSource):
         self._lines = [line if self._mark == "," else decimal_points(line) for line in table]
         self._known = {row[0]: row for _, row in rows[block:first] if row[0]}
         self._places = self._channels(rows[first])
-        self._scale_times(rows[:block], rows[first][1])
+        # What times are counted in, and from when
+        time = decimal_points(rows[first][1][0])
+        self._counted = float(time) > _FILETIME
+        start = next((row[1] for _, row in rows[:block] if row[0] == _START and len(row) > 1 and row[1].isdigit()), "")
+        whole = start if len(start) < 19 and start else time.partition(".")[0]
+        self._origin = int(whole) if self._counted and whole.isdigit() and len(whole) < 19 else 0
 
     @staticmethod
     def recognises(head: bytes) -> bool:
@@ -111,14 +116,6 @@ class TwinCatSource(ArraysSource):
         fastest = min(self._intervals.values(), default=0.0)
         self._slow = {self.times[name] for name, interval in self._intervals.items() if interval > fastest}
         return places
-
-    def _scale_times(self, head: Sequence[tuple[int, list[str]]], first: Sequence[str]) -> None:
-        """Find out what times are counted in, and from when."""
-        time = float(decimal_points(first[0]))
-        self._counted = time > _FILETIME
-        start = next((row[1] for _, row in head if row[0] == _START and len(row) > 1 and row[1].isdigit()), "")
-        whole = start if len(start) < 19 and start else decimal_points(first[0]).partition(".")[0]
-        self._origin = int(whole) if self._counted and whole.isdigit() and len(whole) < 19 else 0
 
     def column(self, name: str) -> Array:
         """Return a channel down to its last sample, or times in s."""

@@ -32,7 +32,12 @@ class DiscreteModel:
         self.T_s: float = check("T_s", T_s)
         self.input_hold: str = check("input_hold", input_hold)
         self.dead_time = dead_time
-        self.A, self.b, self.c, self.d = _discretised(state_space, self.T_s, input_hold)
+        A, b, c = state_space
+        self.A, self.b, self.c, self.d = np.zeros_like(A), np.zeros_like(b), c, 0.0
+        for i in range(0, len(b), 2):  # each mode by the matrix exponential of its augmented system (Van Loan)
+            mode = slice(i, i + 2)
+            self.A[mode, mode], self.b[mode], d = discretised_block(A[mode, mode], b[mode], self.T_s, input_hold)
+            self.d += float(c[mode] @ d)
         self._n = len(self.b)
         self._block = max(1, min(block, BLOCK_MAX))
         # Lifted matrices for windows of up to ``block`` samples
@@ -86,17 +91,6 @@ class DiscreteModel:
         n = len(u)
         x_pb = self._O[:n] @ s + self._T[:n, :n] @ u
         return x_pb, self._powers[n] @ s + self._K[:, self._block - n :] @ u
-
-
-def _discretised(state_space: StateSpace, T_s: float, input_hold: str) -> tuple[Array, Array, Array, float]:
-    """Discretise each mode by the matrix exponential of its augmented system (Van Loan)."""
-    A, b, c = state_space
-    A_d, b_d, d = np.zeros_like(A), np.zeros_like(b), 0.0
-    for i in range(0, len(b), 2):
-        block = slice(i, i + 2)
-        A_d[block, block], b_d[block], direct = discretised_block(A[block, block], b[block], T_s, input_hold)
-        d += float(c[block] @ direct)
-    return A_d, b_d, c, d
 
 
 def discretised_block(A: Array, b: Array, T_s: float, input_hold: str) -> tuple[Array, Array, Array]:

@@ -34,17 +34,11 @@ def each_kind(values: Sequence[str] | Sequence[tuple[str, ...]]) -> list[Any]:
 
     The stage's Y drive differs from its X drive in numbers alone, and the rotary machine from the default one.
     """
-    return [
-        pytest.param(*((value,) if isinstance(value, str) else value), marks=_AT_NIGHT if _only_numbers(value) else [])
-        for value in values
-    ]
+    rows = [(value,) if isinstance(value, str) else value for value in values]
+    return [pytest.param(*row, marks=_AT_NIGHT if row[-1].endswith(("_als25010_y", "_emps")) else []) for row in rows]
 
 
 _AT_NIGHT = [pytest.mark.nightly]
-
-
-def _only_numbers(value: str | tuple[str, ...]) -> bool:
-    return (value if isinstance(value, str) else value[-1]).endswith(("_als25010_y", "_emps"))
 
 
 SHARED_BUILDS = "HYBRIDSEP_TESTS_BUILDS"

@@ -84,10 +84,6 @@ Sensor = Callable[[int, float, float], float]
 """Sensor model: output at sample k from the measured position and its last output, m."""
 
 
-def _faithful(k: int, x_meas: float, last: float) -> float:
-    return x_meas
-
-
 def closed_loop(
     model: str,
     n: int,
@@ -96,7 +92,7 @@ def closed_loop(
     start: float = 0.0,
     weights: Path | None = None,
     size: float = 1.0,
-    sensor: Sensor = _faithful,
+    sensor: Sensor = lambda k, x_meas, last: x_meas,
     delay: int = 0,
     path: str = "staircase",
 ) -> Loop:

@@ -6,6 +6,7 @@ bound acceleration and jerk (as controls of machine tools do).
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from random_drives.drive import Draws
@@ -58,11 +59,6 @@ def _moves(draws: Draws, bounds: Dynamics, n: int, T_s: float, rests: tuple[floa
     return np.cumsum(bounds.filtered(velocity, T_s)) * T_s
 
 
-def _rests(draws: Draws, bounds: Dynamics, n: int, T_s: float) -> Array:
-    """Return few moves with long rests."""
-    return _moves(draws, bounds, n, T_s, (0.5, 1.5))
-
-
 def _segments(draws: Draws, bounds: Dynamics, n: int, T_s: float) -> Array:
     """Return one axis of a contour of short straight segments at a constant feed, which turns or winds on."""
     longest, angle = draws.log_uniform(3e-4, 5e-3), draws.uniform(0.0, 2 * np.pi)
@@ -108,7 +104,7 @@ def _circle(draws: Draws, bounds: Dynamics, n: int, T_s: float) -> Array:
 
 KINDS: dict[str, Callable[[Draws, Dynamics, int, float], Array]] = {
     "moves": _moves,
-    "rests": _rests,
+    "rests": partial(_moves, rests=(0.5, 1.5)),  # few moves
     "segments": _segments,
     "sine": _sine,
     "sweep": _sweep,
