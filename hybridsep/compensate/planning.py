@@ -250,7 +250,7 @@ this share of ``change_max`` only. ``change_max`` is to be twice the largest err
 error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
 may change it by all of ``change_max`` where weights of earlier runs judge it."""
 
-_TAKEN_BACK, _LEAST_SHARE, _NEAR, _UNCHANGED = 0.2, 0.4, 4, 1e-12
+_TAKEN_BACK, _LEAST_SHARE, _NEAR, _UNCHANGED = 0.2, 0.7, 4, 1e-12
 """A plan takes a share of its change of the last one, which grows or falls by the first times the cosine between what
 it changes and what the last plan has changed, up to 1 and down to the second. Both are taken over so many windows, and
 count where their product is more than the last of the square of the plan: less may be rounding. A new plan corrects

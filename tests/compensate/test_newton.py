@@ -184,7 +184,7 @@ def test_a_plan_takes_less_of_a_change_that_takes_back_the_last_one() -> None:
     x_d, sep = moves()[:200], SepCompensator.from_bytes(learned())
     assert sep.plan(x_d).state is SepState.HYBRID
     whole, planning = sep._pending.coefficients, sep._planning  # type: ignore[union-attr]
-    for before, corrected, share in ((1.0, -whole, 0.8), (0.45, -whole, 0.4), (0.5, whole, 0.6), (0.9, whole, 1.0)):
+    for before, corrected, share in ((1.0, -whole, 0.8), (0.8, -whole, 0.7), (0.75, whole, 0.9), (0.9, whole, 1.0)):
         planning.share, planning.corrected = before, 1e-3 * corrected
         sep.plan(x_d)
         np.testing.assert_allclose(sep._pending.coefficients, share * whole, rtol=1e-9)  # type: ignore[union-attr]
