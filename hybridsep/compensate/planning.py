@@ -4,8 +4,9 @@ With the paper's model a plan is on eq. (3), and on the physics model where the 
 soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan. Where its
 own plan runs away, it plans none for a time, and one that ends compensation is judged in place of the remainder; that
 is followed, too, where compensation is switched off, or has tripped. It weighs its experts by their errors in the
-window and half a plan ahead, so that the expert of the next 20 ms alone does not plan what comes behind them. A motion
-faster than all of its run is compensated with at most half of the largest change.
+window and half a plan ahead, so that the expert of the next 20 ms alone does not plan what comes behind them. Where its
+own plan takes back what the last one has changed, a share of it is taken. A motion faster than all of its run is
+compensated with at most half of the largest change.
 """
 
 import math
@@ -250,12 +251,11 @@ this share of ``change_max`` only. ``change_max`` is to be twice the largest err
 error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
 may change it by all of ``change_max`` where weights of earlier runs judge it."""
 
-_TAKEN_BACK, _LEAST_SHARE, _NEAR, _UNCHANGED = 0.2, 0.7, 4, 1e-12
+_TAKEN_BACK, _LEAST_SHARE, _NEAR = 0.2, 0.7, 4
 """A plan takes a share of its change of the last one, which grows or falls by the first times the cosine between what
-it changes and what the last plan has changed, up to 1 and down to the second. Both are taken over so many windows, and
-count where their product is more than the last of the square of the plan: less may be rounding. A new plan corrects
-what was measured last; where a drive is too slow for that, or the model wrong at a frequency, the next one takes back
-what this one has corrected, and the command swings from window to window, also at rest."""
+it changes and what the last plan has changed, up to 1 and down to the second. Both are taken over so many windows. A
+new plan corrects what was measured last; where a drive is too slow for that, or the model wrong at a frequency, the
+next one takes back what this one has corrected, and the command swings from window to window, also at rest."""
 
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
@@ -344,18 +344,18 @@ class AveragedPlanning(Planning):
                     is_away = runs_away(*deltas, error, self.settings.change_max)
                     if not is_away:
                         step = hybrid.coefficients - previous_plan
-                        share = self._share_of(step, previous_plan)
+                        share = self._share_of(step)
                         return ChosenPlan(SepState.HYBRID, previous_plan + share * step, scales, share=share)
             if is_better(last.cost, of_physics.cost):
                 return ChosenPlan(SepState.OFF, last.coefficients, scales, is_away)
         return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)
 
-    def _share_of(self, change: Array, plan: Array) -> float:
-        """Return which share of a change of the last plan, both ``(3 + n_free,)``, m, is taken."""
+    def _share_of(self, change: Array) -> float:
+        """Return which share of a change of the last plan, ``(3 + n_free,)``, m, is taken."""
         near = slice(N_DECIDED + self.n_pinned, N_DECIDED + _NEAR * (self.Np // self.spacing))
-        now, before, plan = change[near], self.corrected[near], plan[near]
+        now, before = change[near], self.corrected[near]
         size = math.sqrt(float(now @ now)) * math.sqrt(float(before @ before))
-        cosine = float(now @ before) / size if size > _UNCHANGED * float(plan @ plan) else 0.0
+        cosine = float(now @ before) / size if size > 0.0 else 0.0
         return min(max(self.share * (1.0 + _TAKEN_BACK * cosine), _LEAST_SHARE), 1.0)
 
     def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:

@@ -346,16 +346,15 @@ static void averaged_planner_take(hsep_averaged_planner *self, const hsep_planne
     const hsep_int first = planner->n_pinned, end = near < self->n ? near : self->n;
     hsep_real *best = hsep_at(self, self->best) + HSEP_N_DECIDED, *corrected = hsep_at(self, self->corrected);
     const hsep_real *rest = hsep_at(self, self->rest) + HSEP_N_DECIDED;
-    hsep_real product = 0.0, now = 0.0, before = 0.0, plan = 0.0;
+    hsep_real product = 0.0, now = 0.0, before = 0.0;
     for (hsep_int i = first; i < end; i++) {
         const hsep_real change = best[i] - rest[i];
         product += change * corrected[i];
         now += change * change;
         before += corrected[i] * corrected[i];
-        plan += rest[i] * rest[i];
     }
     const hsep_real size = hsep_sqrt(now) * hsep_sqrt(before);
-    const hsep_real cosine = size > HSEP_PLANNING_UNCHANGED * plan ? product / size : 0.0;
+    const hsep_real cosine = size > 0.0 ? product / size : 0.0;
     self->share = hsep_fmax(self->share * (1.0 + HSEP_PLANNING_TAKEN_BACK * cosine), HSEP_PLANNING_LEAST_SHARE);
     self->share = hsep_fmin(self->share, 1.0);
     for (hsep_int i = 0; i < self->n; i++) {

@@ -4,9 +4,8 @@
  * delta. Each of at most three Gauss-Newton steps solves the quadratic programme of the linearised model, and goes
  * towards its minimum as far as lowers the cost. Once it has learned, the averaged model judges all plans: its own, the
  * physics model's, and the remainder of the last one; the best is taken, of its own change of the last one a share.
- * Where its own asks for a larger change than
- * compensation is made for, it is wrong, and plans none for a time, which doubles; a plan that ends compensation stands
- * for the remainder then, and is followed where compensation is off.
+ * Where its own asks for a larger change than compensation is made for, it is wrong, and plans none for a time, which
+ * doubles; a plan that ends compensation stands for the remainder then, and is followed where compensation is off.
  *
  * A plan is one function in reading order, cut by yields into short parts, each of which says what it costs;
  * hsep_averaged_planner_run does as many as a sample's equal share of the work that may be left. A block as

@@ -44,7 +44,6 @@
 #define HSEP_PLANNING_TAKEN_BACK 0.2
 #define HSEP_PLANNING_LEAST_SHARE 0.7
 #define HSEP_PLANNING_NEAR 4
-#define HSEP_PLANNING_UNCHANGED 1e-12
 #define HSEP_PLANNING_PINNED_AVERAGED 24
 
 /* hybridsep/compensate/stop.py */
