@@ -80,8 +80,7 @@ def beginnings(recordings: Sequence[Recording], n_most: int) -> list[Recording]:
         end, moving = max(n_most * len(one.x) // n, 2), np.flatnonzero(np.diff(one.x_d))
         rest = int(moving[0]) - end // 20 if len(moving) else 0
         rest = max(0, min(rest, len(one.x) - end, one.n_train - end // 2))
-        counts = (max(count - rest, 0) for count in (one.n_train, one.n_settling))
-        one = Recording(one.x_d[rest:], one.x[rest:], *counts)
+        one = Recording(one.x_d[rest:], one.x[rest:], one.n_train - rest, max(one.n_settling - rest, 0))
         at_rest = np.flatnonzero(np.diff(one.x_d[3 * end // 4 : end]) == 0.0)
         last = 3 * end // 4 + int(at_rest[-1]) + 2 if len(at_rest) else end
         settling = min(one.n_settling, last)

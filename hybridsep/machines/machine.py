@@ -169,10 +169,9 @@ class Machine(FileSection):
         from ..compensate.compensator import SepCompensator
 
         own = self.new_predictor(self.compensator_predictor if predictor is None else predictor)
-        if trained is not None:
-            own.begin_with(trained)
         compensator = SepCompensator(own, self._compensation() if settings is None else settings)
         if trained is not None:
+            own.begin_with(trained)
             compensator.restart()  # without a warm-up
         return compensator
 

@@ -141,7 +141,7 @@ class HybridPredictor:
         return values
 
     def differences(self, trained: "HybridPredictor") -> list[str]:
-        """Return, in words, what must not differ in a predictor whose weights this one takes; its window may."""
+        """Return, in words, what a predictor has with which its weights cannot be taken; its window may be another."""
         found, expected = (
             {**one.learned_with, "input_hold": one.settings.input_hold, "disturbances": len(one.disturbances)}
             for one in (trained, self)
