@@ -257,6 +257,11 @@ it changes and what the last plan has changed, up to 1 and down to the second. B
 new plan corrects what was measured last; where a drive is too slow for that, or the model wrong at a frequency, the
 next one takes back what this one has corrected, and the command swings from window to window, also at rest."""
 
+_DOUBT = 0.1
+"""Share of the variance of its prediction that what a plan gains has to outweigh: of a change that gains ``g`` on the
+last plan, m², ``g/(g + d)`` is taken, where ``d`` is this share of the variances over the plan, weighted as its errors.
+At rest, before sliding, a model from motion predicts errors as small as its noise, and moved the drive for them."""
+
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
 model."""
@@ -343,9 +348,10 @@ class AveragedPlanning(Planning):
                     deltas = values @ hybrid.coefficients, values @ physics
                     is_away = runs_away(*deltas, error, self.settings.change_max)
                     if not is_away:
-                        step = hybrid.coefficients - previous_plan
+                        step, gain = hybrid.coefficients - previous_plan, last.cost - hybrid.cost
                         share = self._share_of(step)
-                        return ChosenPlan(SepState.HYBRID, previous_plan + share * step, scales, share=share)
+                        step *= share / (1.0 + _DOUBT * planner.doubt(last) / gain) if gain > 0.0 else 0.0
+                        return ChosenPlan(SepState.HYBRID, previous_plan + step, scales, share=share)
             if is_better(last.cost, of_physics.cost):
                 return ChosenPlan(SepState.OFF, last.coefficients, scales, is_away)
         return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)

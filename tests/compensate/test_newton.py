@@ -246,7 +246,7 @@ def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_a_time_that_doubles(mo
     sep = SepCompensator.from_bytes(learned())
     monkeypatch.setattr(AveragedPlanning, "choose", recorded)
     sep.change(change_max=1.5e-4)
-    run(sep, sensor=no_faster(0.03), t_init=0.0)
+    run(sep, sensor=no_faster(0.025), t_init=0.0)
     away = [i for i, (_, plan) in enumerate(chosen) if plan.runs_away]
     pause = round(RETRY / (50 * TS))
     assert [chosen[i + 1][0] for i in away] == [pause, 2 * pause]

@@ -113,6 +113,18 @@ static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_a
     return error + hsep_planner_jerk(task->planner, c, hsep_at(self, self->target));
 }
 
+/* Variance of the plan that was predicted last with variances, over all of it, weighted as its errors, m2. */
+static hsep_real averaged_planner_doubt(hsep_averaged_planner *self, const hsep_averaged_task *task)
+{
+    const hsep_real *weight = hsep_at(self, self->weight);
+    const hsep_real *variance = hsep_at_const(task->model, task->model->variance);
+    hsep_real sum = 0.0;
+    for (hsep_int k = 0; k < self->preview; k++) {
+        sum += weight[k] * weight[k] * variance[self->preview - 1 - k];
+    }
+    return sum;
+}
+
 /* Samples that the splines begin with, which are solved for. */
 static hsep_int *averaged_planner_begins(hsep_averaged_planner *self) { return hsep_part(self, self->begins); }
 
@@ -339,7 +351,8 @@ static void averaged_planner_shift(hsep_averaged_planner *self, hsep_int kept)
     memset(corrected + left, 0, (size_t)(self->n - left) * sizeof(hsep_real));
 }
 
-/* Take a share of what the best plan changes, smaller where it takes back what the last plan has changed. */
+/* Take a share of what the best plan changes, smaller where it takes back what the last plan has changed, or gains
+ * little beside the variance of its prediction. */
 static void averaged_planner_take(hsep_averaged_planner *self, const hsep_planner *planner)
 {
     const hsep_int near = HSEP_PLANNING_NEAR * (self->Np / hsep_planner_splines(planner)->spacing);
@@ -357,8 +370,10 @@ static void averaged_planner_take(hsep_averaged_planner *self, const hsep_planne
     const hsep_real cosine = size > 0.0 ? product / size : 0.0;
     self->share = hsep_fmax(self->share * (1.0 + HSEP_PLANNING_TAKEN_BACK * cosine), HSEP_PLANNING_LEAST_SHARE);
     self->share = hsep_fmin(self->share, 1.0);
+    const hsep_real gain = self->cost_of_rest - self->cost;
+    const hsep_real share = gain > 0.0 ? self->share / (1.0 + HSEP_PLANNING_DOUBT * self->doubt / gain) : 0.0;
     for (hsep_int i = 0; i < self->n; i++) {
-        corrected[i] = self->share * (best[i] - rest[i]);
+        corrected[i] = share * (best[i] - rest[i]);
         best[i] = rest[i] + corrected[i];
     }
 }
@@ -561,6 +576,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         if (self->judges) {
             AVERAGED_PLANNER_PREDICT(1, all, rest, 1)
             self->cost = averaged_planner_cost(self, task, rest);
+            self->doubt = averaged_planner_doubt(self, task);
         }
         hsep_averaged_keep_ahead(task->model, self->judges > 0);
 

@@ -49,6 +49,7 @@ typedef struct {
     hsep_int pause;         /* and after the next of its plans that runs away */
     hsep_real cost;         /* m2, of the best plan so far, */
     hsep_real cost_of_rest; /* and of the remainder of the last plan */
+    hsep_real doubt;        /* m2, variance of that, weighted as its errors */
     hsep_real bound;        /* share of change_max that bounds the averaged model's plan */
     hsep_real share;        /* of its change of the last plan that was taken last */
     hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
@@ -75,7 +76,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 45);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 46);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
