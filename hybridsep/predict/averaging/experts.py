@@ -30,6 +30,11 @@ and on the correlation that a window shows."""
 
 _LAG_BOUND = 10.0  # largest lag within a window, relative to the bound on a prediction: what is beyond has diverged
 
+_MOVES, _LEAST_MOVE = 4.0, 1e-6
+"""Bound on the mean square of a feature's effect, relative to that of the residuals about where they began, and the
+least one, relative to that of the residuals: the zeros of command and measurement may be apart, or an axis sag, by a
+hundred times what disturbances move it by."""
+
 _RESOLUTION = 1e-13
 """Least variance of the noise, and least sum of the squares of the rows about the weights, relative to the sum of the
 squares of the targets: the C core has it from a Gram matrix, which does not resolve less, and no less matters before
@@ -40,13 +45,20 @@ squares of the targets: the C core has it from a Gram matrix, which does not res
 class ResidualScale:
     """Size of the residuals so far."""
 
-    largest_square: float = 0.0  # m²: largest mean square of a window
+    largest_square: float = 0.0  # m²: largest mean square of a window, and about the level where its run began at rest
+    largest_move: float = 0.0
     largest: float = 0.0  # m: largest magnitude
 
-    def follow(self, residuals: Array) -> ResidualScale:
-        """Return the scale with another window of residuals, ``(n,)``, m, n ≥ 1."""
-        mean_square, largest = float(np.mean(residuals**2)), float(np.abs(residuals).max())
-        return ResidualScale(max(self.largest_square, mean_square), max(self.largest, largest))
+    def follow(self, residuals: Array, level: float) -> ResidualScale:
+        """Return the scale with another window of residuals, ``(n,)``, m, n ≥ 1; ``level``, m: of its run at rest."""
+        mean_square, move = float(np.mean(residuals**2)), float(np.mean((residuals - level) ** 2))
+        largest = max(self.largest, float(np.abs(residuals).max()))
+        return ResidualScale(max(self.largest_square, mean_square), max(self.largest_move, move), largest)
+
+    @property
+    def effect(self) -> float:
+        """Effect that a feature may have, m: less than the residuals where most of them is an offset."""
+        return math.sqrt(min(max(_MOVES * self.largest_move, _LEAST_MOVE * self.largest_square), self.largest_square))
 
 
 class ExpertPrediction(NamedTuple):
@@ -273,8 +285,9 @@ class Regression(Expert):
             p, shares, largest = command.p, command.shares, command.largest(scales.step or 1.0)
         else:
             p, shares, largest = settings.p, model.static.shares, scales.largest
-        effect = settings.effect or math.sqrt(square)
+        effect = settings.effect or model.learned.scales[kind].effect
         priors = effect * shares / np.maximum(largest, _LEAST)
+        priors[0] = settings.effect or math.sqrt(square)  # the constant makes up for the offset
         return solve(rows, variance, priors, p if like.has_lags else 0)
 
     def predict(
@@ -291,9 +304,9 @@ class Regression(Expert):
         return at.solved[self].predict(rows, model.run.past[kind], square, most, held, counts)
 
     def forecast(self, at: ExpertWindow) -> Array | float:
-        """Return what it adds to the physics model, within bounds."""
+        """Return what it adds to the physics model, within bounds; before a motion faster than all so far HOLD's."""
         if self not in at.predictions:
-            return 0.0
+            return HOLD.forecast(at) if self.target == MODEL_RESIDUAL and not self.is_fresh else 0.0
         e_h, model = at.predictions[self].e_h, at.model
         if self.like(model).target == MODEL_RESIDUAL:
             return e_h

@@ -64,6 +64,8 @@ class RunState:
     gate: InnovationGate
     n_rejected: int  # measurements that were missing or not plausible
     memory: Memory  # of this run and earlier ones
+    # m: mean residual of the first window that was learned, if the command rested in it, else 0; None before
+    level: float | None = None
 
     @classmethod
     def init(cls, p: int, static: StaticFeatures, command: CommandFeatures, memory: Memory) -> RunState:
@@ -332,13 +334,17 @@ class AveragedModel:
         window = forecast.window._replace(x_d=forecast.window.x_d[:m], x_pb=forecast.window.x_pb[:m])
         fastest = float(np.abs(np.diff(window.x_pb, prepend=run.static.x_pb[-1])).max())
         state = _with_scales(self, forecast, max(self.learned.fastest, fastest))
-        learned, measured = state.learned, x - window.x_pb
+        learned, measured, level = state.learned, x - window.x_pb, run.level
         largest, T_s = learned.scales[MODEL_RESIDUAL].largest, self.settings.T_s
         accepted, gate = gated(run.gate, measured, largest, learned.fastest, T_s)
         e = _bridged(forecast.e_h[:m], measured, accepted)
         e_0 = e + window.x_pb - self.command.late(run.commands, window.x_d)
         rows, static = self.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
         if fold:
+            if level is None and accepted.any():
+                moved = self.static.peak_velocity(np.append(run.static.x_d, window.x_d), window.start) > 0.0
+                level = 0.0 if moved else float(np.mean(e[accepted]))
+                state = replace(state, run=replace(run, level=level))
             of_command = self.command.rows(run.commands, window.x_d)
             state = _folded(state, forecast, (rows, of_command), (e, e_0), accepted)
             state = _judged(state, forecast, (e, e_0), accepted, ahead) if accepted.any() else state
@@ -346,7 +352,7 @@ class AveragedModel:
         n_rejected = run.n_rejected + m - int(accepted.sum())
         commands = np.concatenate((run.commands, window.x_d))[m:]
         memory = forecast.memory.remember(e)
-        run = RunState(static, commands, (past[0], past[1]), gate, n_rejected, memory)
+        run = RunState(static, commands, (past[0], past[1]), gate, n_rejected, memory, level)
         return replace(state, run=run), accepted
 
 
@@ -402,7 +408,8 @@ def _judged_experts(
         expert: learned.errors_of(expert).judge(one, e[expert.like(state).target], accepted, given)
         for expert, one in forecast.predictions.items()
     }
-    of_physics, of_command = (scale.follow(one[accepted]) for scale, one in zip(learned.scales, e, strict=True))
+    level = state.run.level or 0.0
+    of_physics, of_command = (scale.follow(one[accepted], level) for scale, one in zip(learned.scales, e, strict=True))
     return replace(learned.with_errors(errors), scales=(of_physics, of_command))
 
 

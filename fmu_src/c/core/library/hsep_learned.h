@@ -13,7 +13,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define HSEP_LEARNED_MAGIC "HSEPWG14"
+#define HSEP_LEARNED_MAGIC "HSEPWG15"
 
 typedef struct {
     char magic[8];

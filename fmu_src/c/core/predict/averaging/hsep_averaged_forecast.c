@@ -56,7 +56,8 @@ static void averaged_priors(hsep_averaged *self, hsep_int expert, hsep_real scal
     const hsep_int kind = hsep_averaged_kind_of(self, expert);
     const int of_command = kind == HSEP_COMMAND_RESIDUAL;
     const hsep_real step = self->forecast_step > 0.0 ? self->forecast_step : 1.0;
-    const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_sqrt(self->learned.scales[kind].largest_square);
+    const hsep_residual_scale *scale = &self->learned.scales[kind];
+    const hsep_real effect = self->effect > 0.0 ? self->effect : hsep_residual_scale_effect(scale);
     const hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
     hsep_expert *solved = hsep_averaged_expert(self, expert);
     for (hsep_int i = 0; i < solved->n_static; i++) {
@@ -70,6 +71,7 @@ static void averaged_priors(hsep_averaged *self, hsep_int expert, hsep_real scal
         }
         scales[i] = effect * share / hsep_fmax(largest, HSEP_EXPERTS_LEAST);
     }
+    scales[0] = self->effect > 0.0 ? self->effect : hsep_sqrt(scale->largest_square); /* makes up for an offset */
 }
 
 /* Solve for the weights of the experts that know something, from the rows of this run and of earlier ones. */
@@ -123,6 +125,19 @@ static void averaged_hold(hsep_averaged *self, hsep_real last, hsep_int begin, h
     for (hsep_int j = begin; j < end; j++) {
         const hsep_real *row = rows + (self->n - 1 - j) * disturbances->n;
         stacked[j] = hold * (1.0 - hsep_disturbances_turned(disturbances, row));
+    }
+}
+
+/* Before a motion faster than all so far the experts of the physics model's residual know nothing: they hold, too. */
+static void averaged_hold_unknown(hsep_averaged *self, hsep_int begin, hsep_int end)
+{
+    static const hsep_int known_later[] = {HSEP_ARX_RESIDUAL, HSEP_STATIC};
+    hsep_real *stacked = hsep_at(self, self->stacked);
+    for (hsep_int i = 0; i < 2; i++) {
+        if (!self->predicted[known_later[i]]) {
+            hsep_real *of_expert = stacked + known_later[i] * self->n;
+            memcpy(of_expert + begin, stacked + HSEP_HOLD * self->n + begin, (size_t)(end - begin) * sizeof(hsep_real));
+        }
     }
 }
 
@@ -216,6 +231,7 @@ HSEP_API void hsep_averaged_go_on(
         }
     }
     averaged_hold(self, e[self->n], begin, end);
+    averaged_hold_unknown(self, begin, end);
     averaged_stack(self, e, begin, end);
 }
 

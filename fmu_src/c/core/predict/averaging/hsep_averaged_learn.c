@@ -113,7 +113,8 @@ static void averaged_judge_experts(
         }
     }
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
-        hsep_residual_scale_follow(&scales[i], residuals[i] + first, accepted + first, n, self->n_accepted);
+        hsep_residual_scale_follow(
+            &scales[i], residuals[i] + first, accepted + first, n, self->n_accepted, self->level);
     }
 }
 
@@ -290,6 +291,16 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
     }
 }
 
+/* The level of a run: the mean of its first window's residuals, if the command rested in it, else 0. */
+static void averaged_level(hsep_averaged *self, const hsep_real x_d[], const hsep_real e[])
+{
+    const hsep_real moves = hsep_disturbances_peak_velocity(hsep_averaged_disturbances(self), x_d, self->Np);
+    if (!(moves > 0.0)) {
+        self->level = hsep_dot(hsep_at(self, self->accepted), e, self->Np) / self->n_accepted;
+    }
+    self->is_levelled = 1;
+}
+
 HSEP_API void hsep_averaged_learn(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], int fold)
 {
@@ -305,6 +316,9 @@ HSEP_API void hsep_averaged_learn(
         averaged_take_rows(self, x_pb, e, self->Np);
     }
     self->n_rejected += self->Np - (hsep_int)self->n_accepted;
+    if (fold && !self->is_levelled && self->n_accepted > 0.0) {
+        averaged_level(self, x_d, e);
+    }
     hsep_disturbances_end(hsep_averaged_disturbances(self));
     hsep_recall_remember(hsep_averaged_recall(self), e);
     if (fold && self->n_accepted > 0.0) {

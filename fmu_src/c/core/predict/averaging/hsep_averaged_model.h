@@ -52,7 +52,9 @@ typedef struct {
     hsep_real forgetting_factor; /* weight of earlier rows, from window to window */
     hsep_int leading;            /* expert that led when earlier runs ended, HSEP_ARX_RESIDUAL or HSEP_ARX_COMMAND */
     hsep_gate reach;
-    hsep_int n_rejected; /* samples of this run that were not accepted */
+    hsep_int n_rejected;  /* samples of this run that were not accepted */
+    hsep_int is_levelled; /* whether its first window is learned, */
+    hsep_real level;      /* m, and the mean residual in it, if the command rested, else 0 */
     /* Of the window that is predicted */
     hsep_real forecast_scale;           /* m/s, velocity scale with it, */
     hsep_real forecast_step;            /* m, and largest change of the command, */
@@ -87,11 +89,11 @@ typedef struct {
     hsep_learned learned;
 } hsep_averaged;
 
-#define HSEP_LEARNED_WORDS (3 + 2 * HSEP_N_RESIDUALS + 2 * HSEP_N_REGRESSIONS + HSEP_N_STACKS * HSEP_STACK_WORDS)
+#define HSEP_LEARNED_WORDS (3 + 3 * HSEP_N_RESIDUALS + 2 * HSEP_N_REGRESSIONS + HSEP_N_STACKS * HSEP_STACK_WORDS)
 HSEP_ASSERT_WORDS(hsep_learned, HSEP_LEARNED_WORDS);
 HSEP_ASSERT_WORDS(
     hsep_averaged,
-    38 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + HSEP_LEARNED_WORDS + sizeof(hsep_gate) / sizeof(hsep_real));
+    40 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + HSEP_LEARNED_WORDS + sizeof(hsep_gate) / sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_residual_parameters *parameters);
 /* Fill the block, which is 0, at rest at start, m, with nothing learned. */

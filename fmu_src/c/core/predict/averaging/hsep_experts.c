@@ -5,15 +5,24 @@
 #include "hsep_vector.h"
 
 HSEP_API void hsep_residual_scale_follow(
-    hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count)
+    hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count,
+    hsep_real level)
 {
-    hsep_real sum = 0.0;
+    hsep_real sum = 0.0, moves = 0.0;
     for (hsep_int j = 0; j < n; j++) {
-        const hsep_real residual = accepted[j] * residuals[j];
+        const hsep_real residual = accepted[j] * residuals[j], move = accepted[j] * (residuals[j] - level);
         sum += residual * residual;
+        moves += move * move;
         self->largest = hsep_fabs(residual) > self->largest ? hsep_fabs(residual) : self->largest;
     }
     self->largest_square = hsep_fmax(self->largest_square, sum / count);
+    self->largest_move = hsep_fmax(self->largest_move, moves / count);
+}
+
+HSEP_API hsep_real hsep_residual_scale_effect(const hsep_residual_scale *self)
+{
+    const hsep_real square = self->largest_square, least = HSEP_EXPERTS_LEAST_MOVE * square;
+    return hsep_sqrt(hsep_fmin(hsep_fmax(HSEP_EXPERTS_MOVES * self->largest_move, least), square));
 }
 
 HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape)

@@ -13,7 +13,8 @@
 
 /* Size of the residuals so far. */
 typedef struct {
-    hsep_real largest_square; /* m2, largest mean square of a window */
+    hsep_real largest_square; /* m2, largest mean square of a window, */
+    hsep_real largest_move;   /* m2, and about the level where its run began at rest */
     hsep_real largest;        /* m, largest magnitude */
 } hsep_residual_scale;
 
@@ -47,13 +48,18 @@ typedef struct {
     hsep_int solution;   /* hsep_solution, whose head are the lags */
 } hsep_expert;
 
-HSEP_ASSERT_WORDS(hsep_residual_scale, 2);
+HSEP_ASSERT_WORDS(hsep_residual_scale, 3);
 HSEP_ASSERT_WORDS(hsep_expert_errors, 2);
 HSEP_ASSERT_WORDS(hsep_expert, 17);
 
-/* Take another window of residuals, (n,), m, into a scale; accepted: (n,), 1 where it counts; count: how many do. */
+/* Take another window of residuals, (n,), m, into a scale; accepted: (n,), 1 where it counts; count: how many do;
+ * level: m, of its run at rest. */
 HSEP_API void hsep_residual_scale_follow(
-    hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count);
+    hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count,
+    hsep_real level);
+
+/* Effect that a feature may have, m: less than the residuals where most of them is an offset. */
+HSEP_API hsep_real hsep_residual_scale_effect(const hsep_residual_scale *self);
 
 HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape);
 HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
