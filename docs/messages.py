@@ -148,7 +148,8 @@ FINDINGS: Mapping[str, Explanation] = {
         "beside its command, as under gravity in a position loop without an integrator. The columns do not tell which.",
         "A prediction needs none: the offset is learned. A compensator moves the axis by it. That is right where the "
         "axis stands beside its command. Where only the zeros differ, take the offset away from the measured column, "
-        "and from what the compensator measures, before it moves the axis.",
+        "and from what the compensator measures, before it moves the axis. Where the offset is ten times all that the "
+        "error varies by, the limits that `fit` estimates leave it out, and the compensator trips at once.",
     ),
     "start in motion": Explanation(
         "The axis moves when the log begins; the physics model starts from rest.",

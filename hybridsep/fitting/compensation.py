@@ -31,6 +31,10 @@ _ROUNDING = 0.1  # most that rounding may have of the largest difference of comm
 _OVER = tuple(sorted({round(1.25**i) for i in range(40)}))  # samples that such a difference may be over
 _HELD, _STEPS = 0.1, 100  # quantile of the intervals between changes for which a command is held; fewer are steps
 
+_ZERO = 10.0
+"""Offset of command and measurement, relative to all that the error varies by, from which on it is none of the axis: by
+limits that count it a compensator would move the axis by as much, and nothing would trip."""
+
 _FOLLOWING_ERROR = 1.3
 """``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
 error below that was above it (``python -m benchmarks.faults``)."""
@@ -104,10 +108,18 @@ def _motion(x_d: Array, T_s: float) -> list[float]:
     return found
 
 
+def _largest_error(error: Array) -> float:
+    """Return the largest servo error of a log, m, ``(n,)``, about its median where that is another zero of the sensor."""
+    median = float(np.nanmedian(error))
+    varies = float(np.nanmax(np.abs(error - median)))
+    return varies if abs(median) > _ZERO * varies else float(np.nanmax(np.abs(error)))
+
+
 def largest_motion(recordings: Sequence[Recording], T_s: float) -> tuple[Array, float]:
     """Return the largest velocity, acceleration and jerk of the commands, ``(3,)``, and the largest servo error, m."""
     peaks = np.array([_motion(one.x_d, T_s) for one in recordings]).reshape(-1, 3).max(axis=0, initial=0.0)
-    return peaks, max((float(np.nanmax(np.abs(one.x_d - one.x), initial=0.0)) for one in recordings), default=0.0)
+    measured = [error for error in (one.x_d - one.x for one in recordings) if np.isfinite(error).any()]
+    return peaks, max(map(_largest_error, measured), default=0.0)
 
 
 def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, Any]:

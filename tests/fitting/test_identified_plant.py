@@ -114,6 +114,14 @@ def test_commands_that_begin_in_motion_have_a_lead_in_from_rest(rounded: float, 
     assert n < 500
 
 
+@pytest.mark.parametrize(("offset", "counts"), [(0.05, False), (5e-4, True)])
+def test_zeros_that_are_apart_are_no_servo_error(offset: float, counts: bool) -> None:
+    """A compensator was allowed to move an axis by 0.1 m, and did."""
+    one = recorded(StageDrive(ModalModel([MODE])))
+    (_, error), (_, found) = (largest_motion([replace(one, x=one.x + by)], T_S) for by in (0.0, offset))
+    assert found == pytest.approx(error + offset if counts else error, rel=0.3)
+
+
 def test_limits_are_estimated_from_the_motion() -> None:
     recording = recorded(StageDrive(ModalModel([MODE])))
     found = estimated_limits([recording], T_S)

@@ -105,6 +105,31 @@ def test_an_axis_that_stands_is_learned(new_stream: StreamMaker, name: str) -> N
 
 
 @cache
+def moves_to_and_fro() -> tuple[Array, Array]:
+    """Return commands that rest, then move further each time, and measured positions, (3000,), m, of a servo."""
+    ways = np.repeat([0.0, 1e-3, -1e-3, 4e-3, -4e-3, 0.02, -0.02, 0.02, -0.02], [200, *([350] * 8)])
+    velocity = np.convolve(ways, np.full(60, 1 / 60))[:3000] * (np.arange(3000) % 350 > 150) * 0.02
+    x_d = np.cumsum(velocity)
+    return x_d, servo(x_d, 1e-3, f_n=25.0, zeta=0.7, static=2e-5, coulomb=1.5e-5, resolution=1e-7)
+
+
+@on_all((PREDICTOR,), needs="figures")
+@pytest.mark.parametrize("offset", [1e-3, 0.05])
+def test_zeros_that_are_apart_cost_no_accuracy(new_stream: StreamMaker, offset: float) -> None:
+    """Before a motion faster than all so far nothing was predicted, behind it features had to explain the offset."""
+    x_d, x = moves_to_and_fro()
+    values: dict[str, Value] = {"averaging": True, "Np": NP, "p": NP, "q": 3, "t_init": 0.0}
+
+    def error(zero: float) -> float:
+        measured = np.concatenate((np.full(NP, zero), x + zero))[: len(x)]
+        outputs = run(new_stream(), x_d, measured, values)
+        x_h = outputs[2 * NP : -1, OUTPUTS[PREDICTOR].index("x_h")]
+        return rms(x[NP : NP + len(x_h)] + zero - x_h)
+
+    assert error(offset) < 1.3 * error(0.0)
+
+
+@cache
 def servo_of_library(Np: int) -> dict[str, Array]:
     return of_servo(LookAheadStream(PREDICTOR), "to and fro", Np)[0]
 
