@@ -43,6 +43,9 @@ _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 """Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit."""
 
 _START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
+# Of counters that wrap: motion in a sample, relative to all that they count, and what rounding leaves of a whole count
+_BITS, _IN_A_SAMPLE, _WHOLE = (16, 32), 0.1, 1e-2
+_SLOW = 0.1  # sampling interval, s, from which it is noted: milliseconds may have been given as seconds
 _LATE = 0.1  # lag, s, from which it is noted: the look-ahead of a controller of which nothing is known
 
 _ALONE, _SIZE = 10.0, 0.02  # size of an outlier in the usual steps, and relative to the travel, to be noted
@@ -141,6 +144,24 @@ def _hopeless(log: Log) -> Iterator[Finding]:
             "simulated; name the measured position's column (--x NAME)"
         )
         yield Finding("same column", words, {"n": float(n)}, refused=True)
+    else:
+        yield from _wraps(log)
+
+
+def _wraps(log: Log) -> Iterator[Finding]:
+    """Find positions that jump by all that a counter counts, while the axis moves by little in a sample."""
+    for name, x in (("commanded", log.x_d), ("measured", log.x_meas)):
+        counts = np.abs(np.diff(x[np.isfinite(x)])) / resolution(x)
+        if (np.abs(counts - np.round(counts)) > _WHOLE).any():
+            continue
+        for bits in _BITS:
+            n_wraps = np.count_nonzero(np.abs(counts / 2.0**bits - 1.0) < _IN_A_SAMPLE)
+            if n_wraps and n_wraps == np.count_nonzero(counts / 2.0**bits > _IN_A_SAMPLE):
+                words = (
+                    f"the {name} position jumps by {2**bits} of its smallest steps, in {n_wraps} samples: a counter of "
+                    f"{bits} bits wraps; unwrap it before (numpy.unwrap with a period of {2**bits} counts)"
+                )
+                yield Finding("wraps", words, {"n": float(n_wraps)}, refused=True)
 
 
 def _unit(log: Log) -> Iterator[Finding]:
@@ -340,6 +361,9 @@ def _note_rate(log: Log) -> Iterator[Finding]:
         )
         options = (("--resample", "at even times, linearly between samples"),)
         yield Finding("rate", words, {"n": float(len(where)), "largest": largest}, options=options)
+    if log.T_s > _SLOW:
+        words = f"the samples are {log.T_s:.3g} s apart, slower than controllers are: times, and T_s, are in seconds"
+        yield Finding("slow samples", words, {"T_s": log.T_s})
 
 
 def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterator[Finding]:
