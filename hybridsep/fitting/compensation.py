@@ -109,7 +109,7 @@ def _motion(x_d: Array, T_s: float) -> list[float]:
 
 
 def _largest_error(error: Array) -> float:
-    """Return the largest servo error of a log, m, ``(n,)``, about its median where that is another zero of the sensor."""
+    """Return the largest servo error of a log, ``(n,)``, m: about its median where that is another zero."""
     median = float(np.nanmedian(error))
     varies = float(np.nanmax(np.abs(error - median)))
     return varies if abs(median) > _ZERO * varies else float(np.nanmax(np.abs(error)))
