@@ -243,8 +243,6 @@ class _OwnController:
 
 
 class _LibraryDrive:
-    """A plant and its encoder."""
-
     name: str = "the plant"  # in error messages
     T_s: float | None = None  # sampling interval, s; None if it can be any
 

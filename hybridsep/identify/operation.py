@@ -149,7 +149,6 @@ def _findings(
     shown: DisplayUnits,
     part: str,
 ) -> list[str]:
-    """Return what a user should know of the identification, in words."""
     findings = []
     n = sum(int(segment.known.sum()) for segment in segments)
     moving = sum(np.count_nonzero(np.diff(s.u)) for s in segments) / sum(len(s.u) for s in segments)
