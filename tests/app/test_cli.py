@@ -10,7 +10,7 @@ import pytest
 from command_line import Run, predictor, write_log, write_rows
 from staircase_data import commanded
 
-from hybridsep import Encoder, cosimulate, load_machine
+from hybridsep import Encoder, cosimulate, load_machine, staircase
 from hybridsep.base.files import data_folder
 from hybridsep.base.version import version_text
 from hybridsep.evaluate.backtest import backtest
@@ -142,6 +142,18 @@ def test_two_axes_are_delayed_alike(hybridsep: Run, tmp_path: Path) -> None:
     y.write_text(text.replace("preview = 200", "preview = 150"), encoding="utf-8")
     err = hybridsep.refused("cosim", "als25010_x", y, "--path", "part.ngc")
     assert "one preview, got 0.001 s and 200 samples and 0.001 s and 150 samples" in err
+
+
+@pytest.mark.slow
+def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
+    machine, weights = load_machine("spring_mass_damper"), tmp_path / "trained.state"
+    compensator = machine.new_compensator()
+    cosimulate(compensator, machine.new_plant(), staircase()[:2500], encoder=Encoder(5e-6, 1))
+    compensator.predictor.save(weights)
+    command = write_rows(tmp_path / "command.csv", commanded()[:2000], commanded()[:2000])
+    out = hybridsep.done("cosim", "--compensate", "hybrid", "--trajectory", command, "--weights", weights, "--json")
+    assert json.loads(out)["tracking_rms_um"] < 2.5
+    assert json.loads(out)["share_hybrid"] == 1.0
 
 
 def test_help_lists_the_commands_in_whole_sentences(hybridsep: Run) -> None:
