@@ -173,10 +173,7 @@ def _refuse(given: object, message: str) -> None:
 
 
 class _LibraryController:
-    """A predictor or compensator after its look-ahead, with the FMU's timing; a run keeps what it has learned.
-
-    ``t_init``: Warm-up, s; its own if left out.
-    """
+    """A predictor or compensator after its look-ahead, with the FMU's timing; a run keeps what it has learned."""
 
     name: str = "the controller"  # in error messages
     # Sampling interval, s; samples in a window, by which it delays the trajectory, and by which it is told that
@@ -243,8 +240,6 @@ class _OwnController:
 
 
 class _LibraryDrive:
-    """A plant and its encoder."""
-
     name: str = "the plant"  # in error messages
     T_s: float | None = None  # sampling interval, s; None if it can be any
 
@@ -264,11 +259,7 @@ class _LibraryDrive:
 
 
 class _OpenedFmu(AbstractContextManager["_OpenedFmu"]):
-    """FMU whose instance lives as long as the context.
-
-    ``path``: the archive; ``role``: name of the instance, as its log messages show it; ``values``: parameters to set
-    before the initialization.
-    """
+    """FMU whose instance lives as long as the context; its log messages call it by its ``role``."""
 
     def __init__(self, path: str | Path, role: str, values: Mapping[str, Any]) -> None:
         self._path, self._role, self._values = path, role, values

@@ -19,7 +19,6 @@ from matplotlib.patches import Patch
 
 from ..base.files import atomic_open
 from ..base.metrics import rms
-from ..base.signals import Array
 from ..cosim.contour import Contour
 from ..cosim.run import Run
 from ..logs.units import DisplayUnits, shown_in
@@ -138,7 +137,7 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path, shown
     model planned. Positions are in the units ``shown``, mm and µm if left out.
     """
     shown, runs = shown or shown_in("m"), {key: run for key, run in runs.items() if key in CASES}
-    (factor, position), (scale, unit) = shown.position, shown.small
+    factor, position = shown.position
     compensated = {key: run for key, run in runs.items() if key != "off"}
     enlarged = 0 < len(compensated) < len(runs)
     ratios = [1.0, 1.6, *([1.8] if enlarged else []), 1.5]
@@ -148,13 +147,10 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path, shown
     first = next(iter(runs.values()))
     panels[0].plot(first.t - first.t[0], factor * first.x_d, linewidth=1.2, color="black")
     panels[0].set_ylabel(f"commanded\nposition [{position}]")
-    _draw_signals(panels[1], {key: run.error for key, run in runs.items()}, runs, scale, unit)
-    panels[1].set_ylabel(f"tracking error\nx_d − x [{unit}]")
+    _draw_runs(panels[1], runs, "error", shown.small, "tracking error\nx_d − x")
     if enlarged:
-        _draw_signals(panels[2], {key: run.error for key, run in compensated.items()}, runs, scale, unit)
-        panels[2].set_ylabel(f"tracking error,\nenlarged [{unit}]")
-    _draw_signals(panels[-1], {key: run.change for key, run in (compensated or runs).items()}, runs, scale, unit)
-    panels[-1].set_ylabel(f"change of command\nx_dm − x_d [{unit}]")
+        _draw_runs(panels[2], compensated, "error", shown.small, "tracking error,\nenlarged")
+    _draw_runs(panels[-1], compensated or runs, "change", shown.small, "change of command\nx_dm − x_d")
     panels[-1].set_xlabel("time [s]")
     handles = [*panels[1].get_lines(), *(_shade(panels[1:], first) if len(runs) == 1 else [])]
     figure.legend(
@@ -170,12 +166,14 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path, shown
     save_figure(figure, path)
 
 
-def _draw_signals(axes: Axes, signals: Mapping[str, Array], runs: Mapping[str, Run], scale: float, unit: str) -> None:
-    """Draw one signal of each run in a unit of which ``scale`` are one m or rad, labelled with its tracking error."""
-    for key, signal in signals.items():
-        (label, color), run = CASES[key], runs[key]
+def _draw_runs(axes: Axes, runs: Mapping[str, Run], signal: str, shown: tuple[float, str], what: str) -> None:
+    """Draw a signal of each run in a unit, of which so many are one m or rad, labelled with its tracking error."""
+    scale, unit = shown
+    for key, run in runs.items():
+        label, color = CASES[key]
         label = f"{label}: {scale * rms(run.error):.1f} {unit}"
-        axes.plot(run.t - run.t[0], scale * signal, linewidth=0.9, color=color, label=label)
+        axes.plot(run.t - run.t[0], scale * getattr(run, signal), linewidth=0.9, color=color, label=label)
+    axes.set_ylabel(f"{what} [{unit}]")
 
 
 def _shade(panels: Sequence[Axes], run: Run) -> list[Patch]:

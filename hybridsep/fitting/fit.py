@@ -403,7 +403,6 @@ def _identified(
     logs: Sequence[Log],
     progress: Callable[[float], object],
 ) -> IdentifiedModel:
-    """Return the identification from the training samples, in the units of the logs."""
     training = [in_time(*one.training, settings.n_late) for one in recordings if one.n_train > 1]
     try:
         return identify_operation(

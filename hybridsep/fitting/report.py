@@ -66,16 +66,11 @@ def write_identification(report: Report, found: IdentifiedModel, judged: Judged)
             rows.append([one.name, f"{factor * one.value:.6g}", std, name])
         report.table(["parameter", "value", "standard deviation", "unit"], rows)
     if found.alternatives:
-        rows = [
-            [
-                other.name,
-                str(other.n_parameters),
-                f"{scale * other.rms_fitted:.4g}",
-                f"{scale * other.rms_held_out:.4g}",
-                other.objection or ("chosen" if other.name == found.structure else ""),
-            ]
-            for other in found.alternatives
-        ]
+        rows = []
+        for other in found.alternatives:
+            errors = (f"{scale * rms:.4g}" for rms in (other.rms_fitted, other.rms_held_out))
+            verdict = other.objection or ("chosen" if other.name == found.structure else "")
+            rows.append([other.name, str(other.n_parameters), *errors, verdict])
         report.table(["structure", "parameters", f"fitted [{unit}]", f"held out [{unit}]", ""], rows, words=4)
         report.paragraph("RMS of the simulated position within the training half.", "dim")
     report.bullets(found.findings)
@@ -163,15 +158,10 @@ def write_settings(report: Report, choice: Sequence[Tried], judged: Judged) -> N
     """Write the settings that were tried."""
     scale, unit = judged.unit
     report.heading("Settings")
-    rows = [
-        [
-            str(one.p),
-            str(one.q),
-            f"{scale * one.rms_h:.4g}" if math.isfinite(one.rms_h) else "diverged",
-            "chosen" if one.chosen else "",
-        ]
-        for one in choice
-    ]
+    rows = []
+    for one in choice:
+        rms = f"{scale * one.rms_h:.4g}" if math.isfinite(one.rms_h) else "diverged"
+        rows.append([str(one.p), str(one.q), rms, "chosen" if one.chosen else ""])
     report.table(["p", "q", f"RMS [{unit}]", ""], rows)
     report.paragraph(
         "Errors of causal replays over the later half of the training samples. The first row, the default, stays "

@@ -41,8 +41,6 @@ numbers. An overflow of an array on the stack ends the process before the functi
 
 @dataclass(frozen=True)
 class _Target:
-    """A platform an FMU can have a binary for."""
-
     triple: str  # zig's name of it
     folder: str  # where importers of FMI 2.0 look for the library, below ``binaries/``
     suffix: str

@@ -16,7 +16,6 @@ from ..base.settings import PARAMETERS
 from ..base.signals import Array, as_samples
 from ..machines.machine import PAPER_SETTINGS, Machine
 from ..machines.sections import FeedDriveSection, IdentifiedSection
-from ..model.physics import ModalModel
 from ..plants.trajectory import staircase
 from .flavours import FLAVOURS, FMI_VERSIONS
 from .variables import SAMPLES_TRAJECTORY, FmuTable
@@ -156,7 +155,7 @@ def table_of(
 def _starts(machine: Machine, model: str) -> tuple[dict[str, Any], tuple[dict[str, float], ...]]:
     if model in ("HybridPredictor", "SepCompensator"):
         values = machine.fmi_parameters() if model == "HybridPredictor" else machine.fmi_compensator_parameters()
-        return dict(values), _modes(machine.model)
+        return dict(values), tuple(map(asdict, machine.model.modes))
     if model == "ReferenceTrajectory":
         return {"trajectory": 0, "T_s": machine.T_s}, ()
     assert machine.plant is not None  # by fmu_names
@@ -172,11 +171,7 @@ def _starts(machine: Machine, model: str) -> tuple[dict[str, Any], tuple[dict[st
     parameters = {"v_friction": PARAMETERS["v_friction"].default, **parameters}
     parameters |= {key: PARAMETERS[key].to_fmi(value) for key, value in chosen.items()}
     parameters |= {"T_s": machine.T_s, "dead_time": machine.physics.dead_time}
-    return parameters, _modes(machine.plant_model)
-
-
-def _modes(model: ModalModel) -> tuple[dict[str, float], ...]:
-    return tuple(asdict(mode) for mode in model.modes)
+    return parameters, tuple(map(asdict, machine.plant_model.modes))
 
 
 def content_guid(files: Mapping[str, bytes], table: FmuTable) -> str:

@@ -73,9 +73,10 @@ def identify_operation(
     fit = fit_near(segments, T_s, chosen.fit)
     findings = []
     residual = np.concatenate([(s.y - simulated(fit, s, T_s))[s.known] for s in segments])
-    if _spread(segments) < _WEAK * float(np.std(residual)):
+    moved = float(np.sqrt(np.mean(np.concatenate([(s.u - s.u.mean()) ** 2 for s in segments]))))  # m
+    if moved < _WEAK * float(np.std(residual)):
         fit = fit_structure(segments, T_s, Structure(0), Delay(0), [], slowest=1.0)
-        spread, rest = shown.words(_spread(segments)), shown.words(fit.rms)
+        spread, rest = shown.words(moved), shown.words(fit.rms)
         findings.append(
             f"{TOO_LITTLE} {part} to learn the dynamics from: the commanded position moves by {spread} "
             f"(standard deviation), and {rest} of the measured one are not explained by it; a gain of 1 without lag is "
@@ -128,11 +129,6 @@ def _hindrance(segments: Sequence[Segment]) -> str:
     return ""
 
 
-def _spread(segments: Sequence[Segment]) -> float:
-    """Return the standard deviation of the commanded position, m."""
-    return float(np.sqrt(np.mean(np.concatenate([(s.u - s.u.mean()) ** 2 for s in segments]))))
-
-
 def _alternative(candidate: Candidate, chosen: Candidate) -> Alternative:
     fit, objection = candidate.fit, candidate.objection
     if not objection and candidate is not chosen and candidate.slow_parts:
@@ -149,7 +145,6 @@ def _findings(
     shown: DisplayUnits,
     part: str,
 ) -> list[str]:
-    """Return what a user should know of the identification, in words."""
     findings = []
     n = sum(int(segment.known.sum()) for segment in segments)
     moving = sum(np.count_nonzero(np.diff(s.u)) for s in segments) / sum(len(s.u) for s in segments)

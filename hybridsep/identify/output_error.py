@@ -39,26 +39,17 @@ class Segment:
 
 def as_segments(recordings: Iterable[tuple[ArrayLike, ArrayLike]]) -> list[Segment]:
     """Return the segments of pairs ``(x_d, x)``, of long ones the parts with most motion; none without measurements."""
-    segments = []
-    for x_d, x in recordings:
-        u = as_samples(x_d, "x_d")
-        y = as_measured(x, "x", len(u))
-        segments.append((u, y))
+    segments = [(u := as_samples(x_d, "x_d"), as_measured(x, "x", len(u))) for x_d, x in recordings]
     if sum(len(u) for u, _ in segments) > SAMPLES_MAX:
-        segments = _liveliest(segments, SAMPLES_MAX // _PIECE)
+        pieces = [
+            (u[i : i + _PIECE], y[i : i + _PIECE])
+            for u, y in segments
+            for i in range(0, len(u), _PIECE)
+            if len(u) - i > _PIECE // 2 or i == 0
+        ]
+        power = [float(np.sum(np.diff(u) ** 2)) for u, _ in pieces]  # the squared velocity
+        segments = [pieces[i] for i in sorted(np.argsort(power)[::-1][: SAMPLES_MAX // _PIECE])]
     return [Segment(u - u[0], y - u[0], len(u)) for u, y in segments if np.count_nonzero(~np.isnan(y)) > 1]
-
-
-def _liveliest(segments: list[tuple[Array, Array]], n: int) -> list[tuple[Array, Array]]:
-    """Return the ``n`` pieces with the largest sum of squared velocity, in their order."""
-    pieces = [
-        (u[i : i + _PIECE], y[i : i + _PIECE])
-        for u, y in segments
-        for i in range(0, len(u), _PIECE)
-        if len(u) - i > _PIECE // 2 or i == 0
-    ]
-    power = [float(np.sum(np.diff(u) ** 2)) for u, _ in pieces]
-    return [pieces[i] for i in sorted(np.argsort(power)[::-1][:n])]
 
 
 def motion_split(segments: Sequence[Segment], fraction: float) -> list[Segment]:

@@ -74,8 +74,7 @@ def shorter_delays(segments: Sequence[Segment], T_s: float, fit: Fit) -> Iterato
 
 def _minimum(at: Callable[[int], Fit], first: int, limit: int) -> Fit:
     """Descend from a first number of half samples with steps that double while they help, then halve."""
-    best = at(first)
-    step = 1
+    best, step = at(first), 1
     while True:
         neighbours = {max(0, min(limit, best.delay.halves + sign * step)) for sign in (-1, 1)}
         better = min((at(halves) for halves in neighbours), key=lambda fit: fit.rms)
@@ -96,8 +95,8 @@ def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, ra
         return [np.log([rate])] if structure.lag else [np.empty(0)]
     if structure.n_modes == 1 and not structure.lag:
         return [np.log([factor * rate, zeta]) for factor, zeta in ((1.0, 0.5), (2.0, 0.9), (4.0, 0.3))]
-    bases = [fit for other, fit in known.items() if other.n_modes == structure.n_modes - (not structure.lag)]
-    bases = [fit for fit in bases if not fit.structure.lag]
+    n_modes = structure.n_modes - (not structure.lag)
+    bases = [fit for other, fit in known.items() if other.n_modes == n_modes and not other.lag]
     if not bases:
         return []
     base = min(bases, key=lambda fit: fit.rms).theta

@@ -131,7 +131,6 @@ class TableSource(_GivenSource):
 
 
 def _columns_of(table: Any) -> dict[str, Any]:
-    """Return the columns of a table, by name."""
     if hasattr(type(table), "column_names"):  # Arrow
         return dict(zip(with_own_names(table.column_names)[0], table.columns, strict=True))
     fields = getattr(getattr(table, "dtype", None), "names", None)

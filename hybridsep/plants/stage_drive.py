@@ -6,7 +6,7 @@ from ..base.clock import SampleClock
 from ..base.errors import ParameterError, SignalError
 from ..base.settings import PARAMETERS, check
 from ..base.signals import check_position
-from ..model.physics import ModalModel, Mode
+from ..model.physics import ModalModel
 from .plant import RATE_MAX, STATE_MAX, check_step, internal_steps
 
 _STEPS_MAX = 60  # largest number of Newton steps: 4 to 8 usually, one for each bit where the solution is about to end
@@ -80,12 +80,13 @@ class StageDrive:
         self._n_line = model.dead_time - (self._foh and self._late)
         self._friction_gain = self.f * sum(mode.beta for mode in model.modes)
         self._modes = [(mode.omega**2, 2 * mode.zeta * mode.omega, mode.alpha, mode.beta) for mode in model.modes]
-        self._rate = max(map(_mode_rate, model.modes))
-        for i, mode in enumerate(model.modes, start=1):
-            if _mode_rate(mode) > RATE_MAX:
+        rates = [max(math.sqrt(mode.omega**2), 2 * mode.zeta * mode.omega) for mode in model.modes]  # 1/s
+        self._rate = max(rates)
+        for i, rate in enumerate(rates, start=1):
+            if rate > RATE_MAX:
                 raise ParameterError(
                     f"2 pi f_n and 4 pi f_n zeta of mode[{i}] must be at most {RATE_MAX:g} 1/s in a plant, "
-                    f"got {_mode_rate(mode):g}; lower f_n or zeta"
+                    f"got {rate:g}; lower f_n or zeta"
                 )
         self.reset()
 
@@ -120,7 +121,7 @@ class StageDrive:
             end = max(done, step.first + i * self.T_s) if i < step.n_latched else h
             if end > done:
                 z, v = self._integrated(z, acting, v_d, end - done, v)
-                acting += self._going_on(v_d) * (end - done)
+                acting += v_d * (end - done) if self._foh else 0.0
                 done = end
             if i < step.n_latched:
                 left = self._line[i] if i < self._n_line else r
@@ -150,16 +151,12 @@ class StageDrive:
         """Return the command disturbed by friction, if it is one of the commanded velocity."""
         return r - self.f * math.tanh(v_d / self.v_friction) if self.friction_on == "command" else r
 
-    def _going_on(self, v_d: float) -> float:
-        """Return the velocity, m/s, with which the command goes on between two instants."""
-        return v_d if self._foh else 0.0
-
     def _integrated(
         self, z: list[float], acting: float, v_d: float, time: float, v: float
     ) -> tuple[list[float], float]:
         """Return ``z`` after ``time``, s, from the command that acts, and a velocity of the last internal step."""
         n = internal_steps(time, self._rate)
-        dt, f, rate = time / n, self._derivative, self._going_on(v_d)
+        dt, f, rate = time / n, self._derivative, v_d if self._foh else 0.0  # m/s, with which the command goes on
         half, sixth = dt / 2, dt / 6
         first = self._disturbed(acting, v_d)
         for i in range(n):
@@ -196,8 +193,3 @@ class StageDrive:
             friction = self.f * math.tanh(v / self.v_friction)
             slope[1::2] = [s - friction for s in slope[1::2]]
         return slope
-
-
-def _mode_rate(mode: Mode) -> float:
-    """Return the fastest rate of a mode, 1/s."""
-    return max(math.sqrt(mode.omega**2), 2 * mode.zeta * mode.omega)

@@ -92,8 +92,7 @@ def rest_to_rest(
             "raise its limits or T_s"
         )
     n = samples_before(end, T_s) + 1
-    x_d = np.empty(n)
-    x_d[:] = points[0]
+    x_d = np.full(n, points[0])
     for start, move in moves:
         first = samples_before(start, T_s)
         for k in range(first, n):

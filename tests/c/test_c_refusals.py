@@ -14,10 +14,6 @@ from places import ROOT
 from stream import COMPENSATOR, PLANTS, PREDICTOR, STAGE_PREDICTOR, TRAJECTORY, table_of_model
 
 
-def test_a_number_that_is_not_whole_is_refused() -> None:
-    assert refusal(CModel(PREDICTOR, {"p": 2.5}).size) == "p must be a whole number, got 2.5"
-
-
 def test_many_problems_are_cut_off_within_the_message() -> None:
     parameters = table_of_model(STAGE_PREDICTOR).parameters
     wrong = {key: math.nan for key in CModel(STAGE_PREDICTOR).place if key.startswith("mode[") or key in parameters}

@@ -58,16 +58,6 @@ def test_a_part_without_samples_is_refused(share: float) -> None:
         split_log(pieces(N), share)
 
 
-def test_a_replay_is_the_backtest_of_the_whole_judged_on_its_second_half() -> None:
-    (x_d, x), half = pieces(N)[0], N // 2
-    whole = backtest(predictor(), x_d, x)
-    found = replay(predictor(), split_log([(x_d, x)], 0.5))
-    for i, name in enumerate(("x_pb", "x_hold", "x_h")):
-        np.testing.assert_array_equal(found.joined(name), getattr(whole, name)[half:])
-        np.testing.assert_array_equal(found.errors()[i], (x - getattr(whole, name))[half:])
-        assert found.rms()[i] == pytest.approx(np.sqrt(np.mean((x - getattr(whole, name))[half:] ** 2)))
-
-
 def test_one_set_of_samples_judges() -> None:
     (x_d, x), n, first = pieces(N + 13)[0], N + 13, 220  # 206 samples train, which end within a window
     x[300:305] = np.nan
@@ -75,6 +65,7 @@ def test_one_set_of_samples_judges() -> None:
     found = replace(replay(predictor(), split_log([(x_d, x)], 0.5)), offset=2e-6).with_peers()
     errors = x[first:] - np.stack((whole.x_pb + 2e-6, whole.x_hold, whole.x_h))[:, first:]
     np.testing.assert_array_equal(found.errors(), errors)
+    np.testing.assert_array_equal(found.joined("x_h_std"), whole.x_h_std[first:])
     *others, hybrid = found.scored()
     assert [one.rms for one in (*others[:2], hybrid)] == found.rms()
     assert found.rms() == pytest.approx(np.sqrt(np.nanmean(errors**2, axis=1)).tolist())

@@ -152,13 +152,6 @@ def test_a_bad_table_is_refused(
     assert not library.blocks
 
 
-def test_a_table_of_another_fmu_has_another_guid(folders: Folders) -> None:
-    library = library_of(folders("HybridPredictor"))
-    for name, said in (("HybridPredictor_emps", "fmuGUID must be {"), ("FeedDrive", "it is of another kind of FMU")):
-        assert library.instantiate(resources=(folders(name) / "resources").as_uri()) is None
-        assert said in library.messages[-1][2]
-
-
 # Other files -------------------------------------------------------------------------------------------------------
 
 

@@ -201,14 +201,6 @@ def test_a_new_run_keeps_the_weights_and_forgets_the_rest() -> None:
     assert predicted.e_h[0] == pytest.approx(weights[0], abs=1e-18)
 
 
-def test_the_warm_up_of_a_new_run_is_saved() -> None:
-    predictor = trained(57, t_init=0.5)
-    predictor.restart(t_init=0.013)
-    replay(predictor, *small_signals(10))
-    twin = HybridPredictor.from_bytes(predictor.to_bytes())
-    assert twin.predict(np.zeros(10)).n_warm_up == predictor.predict(np.zeros(10)).n_warm_up == 3
-
-
 def test_an_automatic_warm_up_of_a_new_run_is_that_of_the_settings() -> None:
     predictor = trained(57, t_init=0.013)
     predictor.restart(t_init=-1.0)

@@ -67,21 +67,16 @@ static void check_range_text(char text[], size_t size, const hsep_variable *v, c
         v->maximum, space, unit);
 }
 
-/* Whether a number is in the range of a parameter. */
-static int check_allows(const hsep_variable *v, double value)
-{
-    return value == v->automatic ||
-           (value >= v->minimum && value <= v->maximum && (value == 0.0 || fabs(value) >= v->nonzero));
-}
-
 HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, double value, char message[])
 {
     char number[HSEP_NUMBER_SIZE], name[HSEP_NAME_SIZE], range[96];
     const hsep_variable *v = hsep_table_row(context, i);
     const int whole = v->kind == HSEP_INTEGER || v->kind == HSEP_ENUMERATION;
+    const int tiny = value != 0.0 && fabs(value) < v->nonzero;
+    const int within = (value >= v->minimum && value <= v->maximum && !tiny) || value == v->automatic;
     const char *must = !isfinite(value)                 ? "finite"
                        : whole && value != floor(value) ? "a whole number"
-                       : !check_allows(v, value)        ? range
+                       : !within                        ? range
                                                         : NULL;
     if (must == NULL) {
         return 1;

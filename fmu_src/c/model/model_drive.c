@@ -157,7 +157,6 @@ HSEP_API hsep_status hsep_model_initialise(
     return HSEP_OK;
 }
 
-/* A step is at most 100 s and hsep_plant_step_max long, which bounds its cost. */
 HSEP_API hsep_status
 hsep_model_step(const hsep_context *context, void *state, double values[], double t, double h, char message[])
 {

@@ -125,7 +125,6 @@ static hsep_real averaged_planner_doubt(hsep_averaged_planner *self, const hsep_
     return sum;
 }
 
-/* Samples that the splines begin with, which are solved for. */
 static hsep_int *averaged_planner_begins(hsep_averaged_planner *self) { return hsep_part(self, self->begins); }
 
 /* A spline with this distance of knots. */

@@ -64,7 +64,6 @@ HSEP_API void hsep_compensator_block_init(
     }
 }
 
-/* Samples of a plan. */
 static hsep_int compensator_horizon(const hsep_compensator *self)
 {
     return hsep_planner_splines(hsep_part_const(self, self->planner))->preview;

@@ -125,8 +125,6 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
     }
 }
 
-/* The drive's limits are linear constraints on the rows of a plan (hsep_splines.h), in shares of a limit. */
-
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);

@@ -4,9 +4,7 @@
  *
  * Of a plan only the splines that begin in the first window are applied; hsep_planner_next advances by a window, and
  * the next plan starts from the remainder, which returns to x_d within the limits. A plan whose unconstrained minimum
- * is feasible is found at once; another one is solved in steps of equal cost.
- *
- * A block as hsep_layout.h has them.
+ * is feasible is found at once; another one is solved in steps of equal cost. A block as hsep_layout.h has them.
  */
 #ifndef HSEP_PLANNER_H
 #define HSEP_PLANNER_H

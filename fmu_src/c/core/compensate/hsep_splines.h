@@ -3,9 +3,7 @@
  * Spline j begins at sample j spacing and ends 4 spacings later; the last one ends so that the last four samples of a
  * plan are without change. Splines -3, -2, -1 began before the plan and still act in it. The drive limits the
  * differences of delta of orders 0 to 3. Each of them, as a share of its limit, is a "row": order o at sample k is row
- * o preview + k.
- *
- * A block as hsep_layout.h has them.
+ * o preview + k. A block as hsep_layout.h has them.
  */
 #ifndef HSEP_SPLINES_H
 #define HSEP_SPLINES_H

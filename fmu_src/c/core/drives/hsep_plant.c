@@ -88,9 +88,6 @@ HSEP_API double hsep_stage_lay_out(hsep_stage *self, uint64_t n_modes, const hse
     return end * sizeof(double);
 }
 
-/* Work space of a step, (8 n_modes,), zeros between steps. */
-static inline double *stage_work(hsep_stage *self) { return hsep_at(self, self->line) + self->n_line; }
-
 static const hsep_stage_mode *stage_modes(const hsep_stage *self) { return hsep_part_const(self, self->modes); }
 
 HSEP_API void hsep_stage_init(
@@ -231,7 +228,8 @@ HSEP_API int hsep_stage_step(hsep_stage *self, double x_d, double h)
     double acting = foh || late ? self->acting : r;
     double last_x_d = self->last_x_d, v_d = self->v_d, v = self->v, done = 0.0;
     const size_t z_size = (size_t)(2 * self->n_modes) * sizeof(double);
-    double *line = hsep_at(self, self->line), *z = stage_work(self), *slope = z + 2 * self->n_modes;
+    double *line = hsep_at(self, self->line), *z = line + self->n_line; /* work space, zeros between steps */
+    double *slope = z + 2 * self->n_modes;
     hsep_clock_step step;
     (void)hsep_clock_count(&self->clock, self->clock.end, h, &step);
     memcpy(z, hsep_at(self, self->z), z_size);

@@ -1,9 +1,8 @@
 /* Gram matrix of all rows [phi | target] of a regression, which hsep_solution.h solves.
  *
  * A row costs the same at every sample, a third of the work of updating a triangular factor. The rounding error of an
- * entry is kept and added back with the next rows (compensated summation), so that errors do not pile up.
- *
- * A block as hsep_layout.h has them.
+ * entry is kept and added back with the next rows (compensated summation), so that errors do not pile up. A block as
+ * hsep_layout.h has them.
  */
 #ifndef HSEP_GRAM_H
 #define HSEP_GRAM_H

@@ -6,9 +6,8 @@
  * Givens rotations without square roots (Gentleman 1973): R = D^(1/2) U with a unit triangle U. Weights and data
  * never meet as normal equations, so nothing is squared but single numbers. Error bound: at most sqrt(2) times the
  * bound of ordinary Givens rotations, see hsep_regression.c. The rounding error of an entry is kept and added back with
- * the next row (compensated summation), so that errors do not pile up over 10^8 rows.
- *
- * A block as hsep_layout.h has them.
+ * the next row (compensated summation), so that errors do not pile up over 10^8 rows. A block as hsep_layout.h has
+ * them.
  */
 #ifndef HSEP_REGRESSION_H
 #define HSEP_REGRESSION_H

@@ -173,8 +173,8 @@ HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real
 /* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_AVERAGED_PACE of them in a
  * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
  * residuals; where a measurement is not believed, the predicted one, shifted as the believed ones beside it are off;
- * behind it those before. A
- * sample costs a hsep_gram_fold for each residual, and behind early samples a share of the next window's solutions. */
+ * behind it those before. A sample costs a hsep_gram_fold for each residual, and behind early samples a share of the
+ * next window's solutions. */
 HSEP_API void hsep_averaged_follow(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last);
 
