@@ -67,6 +67,12 @@ def test_the_stages_friction_is_calibrated(axis: str, printed: float) -> None:
     assert 1e6 * np.sqrt(np.mean((x - x_pb) ** 2)) == pytest.approx(printed, rel=1e-4)
 
 
+def test_spring_mass_damper_is_a_25_hz_mode_with_5_percent_damping() -> None:
+    (mode,) = load_machine("spring_mass_damper").model.modes
+    assert mode.f_n == pytest.approx(25.0, rel=1e-4)
+    assert mode.zeta == pytest.approx(0.05, rel=1e-3)
+
+
 def test_emps_follows_from_its_published_constants() -> None:
     M, Fv, gtau, kv, kp = 95.1089, 203.5034, 35.15065188, 243.45, 160.18
     (mode,) = load_machine("emps").model.modes
