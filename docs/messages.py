@@ -84,8 +84,8 @@ FINDINGS: Mapping[str, Explanation] = {
         "Name the column of the measured position with `--x`.",
     ),
     "wraps": Explanation(
-        "A position jumps by 2¹⁶ or 2³² of its smallest steps: a counter of so many bits wraps.",
-        "Unwrap it before, as with `numpy.unwrap(x, period=65536)`, or record it with more bits.",
+        "A position jumps by 2¹⁶ of its smallest steps, and goes on behind the jump as before it: a counter wraps.",
+        "Unwrap it before, as by `numpy.unwrap(x, period=...)` with the message's period, or record it with more bits.",
     ),
     "unit": Explanation(
         "No unit is stated, and the positions are not plausible in metres: too large a travel or acceleration.",
@@ -124,8 +124,8 @@ FINDINGS: Mapping[str, Explanation] = {
         "Record in the controller's own cycle rather than by a PC's clock, or take it at even times: `--resample`.",
     ),
     "slow samples": Explanation(
-        "The samples are more than 0.1 s apart, which no drive's controller has.",
-        "Give `--T_s` in seconds, and state the unit of the times in the column's name, as in `t [ms]`.",
+        "The samples are more than 0.1 s apart, which controllers of drives are not.",
+        "If milliseconds were read as seconds, state the unit in the column's name, as in `t [ms]`, or give `--T_s`.",
     ),
     "outliers": Explanation(
         "Single samples leave the signal: glitches of the encoder or of the transmission, a sensor that was not ready "

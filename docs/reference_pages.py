@@ -220,7 +220,7 @@ def messages() -> str:
     parts += [
         _table(("a message with", "is a"), rows),
         "## Findings",
-        "For the first ten a log is refused: its columns do not mean what they were read for. The others are "
+        "For the first eleven a log is refused: its columns do not mean what they were read for. The others are "
         "**notes**, each with its statistic; the report shows both positions below them; nothing is changed for them.",
     ]
     for name, one in FINDINGS.items():

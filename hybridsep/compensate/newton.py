@@ -144,10 +144,6 @@ class PlanModel:
         """Return ``x_h`` of :meth:`predict` over the plan, ``(n,)``, m."""
         return (at.window.x_pb + at.e_h)[len(self._late) :]
 
-    def variance(self, at: AveragedForecast) -> Array:
-        """Return the variance of :meth:`position`, ``(n,)``, m²."""
-        return at.variance[len(self._late) :]
-
     def slope(self, at: AveragedForecast, changes: Array, passed: Array, reach: float) -> Array:
         """Return the change of ``x_h`` with changes of the commands, ``(n, m)``, once something is learned.
 
@@ -320,7 +316,7 @@ class AveragedPlanner:
 
     def doubt(self, point: PlannedPoint) -> float:
         """Return the variance of what is predicted under a plan, over all of it, weighted as its errors, m²."""
-        return float(self._basis.weight**2 @ self._model.variance(point.prediction))
+        return float(self._basis.weight**2 @ point.prediction.variance[-self._basis.preview :])
 
     def plan(
         self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_followed: int, passed: Array

@@ -91,7 +91,7 @@ class Planning(ABC):
     # shape (n_ahead, n_experts, Np), in m: entry i is what is stacked for the i-th window from this one, by the plan of
     # half a plan before it, the last one by this window's; NaN where nothing is known; with the paper's model none
     ahead: Array
-    share: float  # of the residual model's change of a plan that was taken last
+    share: float  # of the residual model's change of a plan that was taken last, but for what it doubts
     corrected: Array  # (3 + n_free,), m: ``correction`` of the last plan, by the splines of the next one
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
@@ -258,9 +258,9 @@ new plan corrects what was measured last; where a drive is too slow for that, or
 next one takes back what this one has corrected, and the command swings from window to window, also at rest."""
 
 _DOUBT = 0.1
-"""Share of the variance of its prediction that what a plan gains has to outweigh: of a change that gains ``g`` on the
-last plan, m², ``g/(g + d)`` is taken, where ``d`` is this share of the variances over the plan, weighted as its errors.
-At rest, before sliding, a model from motion predicts errors as small as its noise, and moved the drive for them."""
+"""Of a change that gains ``g``, m², on the cost of the last plan ``g/(g + d)`` is taken, too, where ``d`` is this share
+of the variances of what is predicted over the plan, weighted as its errors. At rest, before sliding, a model from
+motion predicts errors as small as its noise, and moved the drive for them."""
 
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
@@ -350,7 +350,8 @@ class AveragedPlanning(Planning):
                     if not is_away:
                         step, gain = hybrid.coefficients - previous_plan, last.cost - hybrid.cost
                         share = self._share_of(step)
-                        step *= share / (1.0 + _DOUBT * planner.doubt(last) / gain) if gain > 0.0 else 0.0
+                        left = 1.0 / (1.0 + _DOUBT * planner.doubt(last) / gain) if gain > 0.0 else 0.0
+                        step *= share * left if left > 0.0 else 0.0  # not NaN
                         return ChosenPlan(SepState.HYBRID, previous_plan + step, scales, share=share)
             if is_better(last.cost, of_physics.cost):
                 return ChosenPlan(SepState.OFF, last.coefficients, scales, is_away)

@@ -31,9 +31,9 @@ _ROUNDING = 0.1  # most that rounding may have of the largest difference of comm
 _OVER = tuple(sorted({round(1.25**i) for i in range(40)}))  # samples that such a difference may be over
 _HELD, _STEPS = 0.1, 100  # quantile of the intervals between changes for which a command is held; fewer are steps
 
-_ZERO = 10.0
-"""Offset of command and measurement, relative to all that the error varies by, from which on it is none of the axis: by
-limits that count it a compensator would move the axis by as much, and nothing would trip."""
+_ZERO, _VARIES = 10.0, 0.999
+"""Offset of command and measurement, relative to what the error varies by in this share of the samples, from which on
+limits do not count it: a compensator would move the axis by as much, and nothing would trip."""
 
 _FOLLOWING_ERROR = 1.3
 """``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
@@ -109,10 +109,11 @@ def _motion(x_d: Array, T_s: float) -> list[float]:
 
 
 def _largest_error(error: Array) -> float:
-    """Return the largest servo error of a log, ``(n,)``, m: about its median where that is another zero."""
+    """Return the largest servo error of a log, ``(n,)``, m: about its median where that is an offset."""
     median = float(np.nanmedian(error))
-    varies = float(np.nanmax(np.abs(error - median)))
-    return varies if abs(median) > _ZERO * varies else float(np.nanmax(np.abs(error)))
+    varies = np.abs(error - median)
+    is_offset = 0.0 < _ZERO * float(np.nanquantile(varies, _VARIES)) < abs(median)
+    return float(np.nanmax(varies if is_offset else np.abs(error)))
 
 
 def largest_motion(recordings: Sequence[Recording], T_s: float) -> tuple[Array, float]:
@@ -293,6 +294,11 @@ class Tracking:
             lines.append(
                 f"The largest servo error of the log, {shown.words(self.largest, '.4g')}, is above change_max: "
                 f"{left} of it cannot be compensated."
+            )
+        if 0.0 < self.following_error_max < self.none.largest:
+            lines[-1] += (
+                " The log's own error is above following_error_max, so the compensator may trip at once: take what the "
+                "zeros are apart from the measurement or, where the axis sags, give both limits."
             )
         if self.held > 1:
             lines.append(

@@ -43,8 +43,7 @@ _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 """Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit."""
 
 _START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
-# Of counters that wrap: motion in a sample, relative to all that they count, and what rounding leaves of a whole count
-_BITS, _IN_A_SAMPLE, _WHOLE = (16, 32), 0.1, 1e-2
+_COUNTS, _IN_A_SAMPLE, _WHOLE = 2**16, 0.1, 1e-2  # of a counter: range, motion in a sample relative to it, rounding
 _SLOW = 0.1  # sampling interval, s, from which it is noted: milliseconds may have been given as seconds
 _LATE = 0.1  # lag, s, from which it is noted: the look-ahead of a controller of which nothing is known
 
@@ -149,19 +148,21 @@ def _hopeless(log: Log) -> Iterator[Finding]:
 
 
 def _wraps(log: Log) -> Iterator[Finding]:
-    """Find positions that jump by all that a counter counts, while the axis moves by little in a sample."""
-    for name, x in (("commanded", log.x_d), ("measured", log.x_meas)):
-        counts = np.abs(np.diff(x[np.isfinite(x)])) / resolution(x)
-        if (np.abs(counts - np.round(counts)) > _WHOLE).any():
-            continue
-        for bits in _BITS:
-            n_wraps = np.count_nonzero(np.abs(counts / 2.0**bits - 1.0) < _IN_A_SAMPLE)
-            if n_wraps and n_wraps == np.count_nonzero(counts / 2.0**bits > _IN_A_SAMPLE):
-                words = (
-                    f"the {name} position jumps by {2**bits} of its smallest steps, in {n_wraps} samples: a counter of "
-                    f"{bits} bits wraps; unwrap it before (numpy.unwrap with a period of {2**bits} counts)"
-                )
-                yield Finding("wraps", words, {"n": float(n_wraps)}, refused=True)
+    """Find positions that jump by all that a counter counts, and go on behind the jump as before it."""
+    for name, column in (("commanded", "x_d"), ("measured", "x_meas")):
+        signals = [getattr(one, column) for one in log.segments()]
+        x, jumps = np.concatenate(signals), np.concatenate([np.diff(one) for one in signals])
+        step = resolution(x)
+        counts = np.abs(jumps[np.isfinite(jumps)]) / step
+        beside = np.abs(counts - _COUNTS)
+        wraps, others = beside < _IN_A_SAMPLE * _COUNTS, counts[beside >= _IN_A_SAMPLE * _COUNTS]
+        is_counter = _travel(x) < _COUNTS * step and (np.abs(counts - np.round(counts)) < _WHOLE).all()
+        if wraps.any() and is_counter and beside[wraps].max() <= 2.0 * others.max(initial=0.0):
+            words = (
+                f"the {name} position jumps by {_COUNTS} of its smallest steps, in {wraps.sum()} samples: a counter of "
+                f"16 bits wraps; unwrap it before, with a period of {log.shown.words(_COUNTS * step, '.6g')}"
+            )
+            yield Finding("wraps", words, {"n": float(wraps.sum())}, refused=True)
 
 
 def _unit(log: Log) -> Iterator[Finding]:
@@ -362,7 +363,7 @@ def _note_rate(log: Log) -> Iterator[Finding]:
         options = (("--resample", "at even times, linearly between samples"),)
         yield Finding("rate", words, {"n": float(len(where)), "largest": largest}, options=options)
     if log.T_s > _SLOW:
-        words = f"the samples are {log.T_s:.3g} s apart, slower than controllers are: times, and T_s, are in seconds"
+        words = f"the samples are {log.T_s:.3g} s apart: were milliseconds given as s?"
         yield Finding("slow samples", words, {"T_s": log.T_s})
 
 

@@ -118,6 +118,7 @@ def test_commands_that_begin_in_motion_have_a_lead_in_from_rest(rounded: float, 
 def test_zeros_that_are_apart_are_no_servo_error(offset: float, counts: bool) -> None:
     """A compensator was allowed to move an axis by 0.1 m, and did."""
     one = recorded(StageDrive(ModalModel([MODE])))
+    one.x[5] = one.x_d[5] - offset  # a sensor that is not ready does not decide it
     (_, error), (_, found) = (largest_motion([replace(one, x=one.x + by)], T_S) for by in (0.0, offset))
     assert found == pytest.approx(error + offset if counts else error, rel=0.3)
 

@@ -129,6 +129,16 @@ def test_zeros_that_are_apart_cost_no_accuracy(new_stream: StreamMaker, offset: 
     assert error(offset) < 1.3 * error(0.0)
 
 
+@on_all((PREDICTOR,), needs="figures")
+def test_an_offset_is_held_where_a_first_motion_turns(new_stream: StreamMaker) -> None:
+    k = np.arange(400.0)
+    x_d = 1e-9 * np.maximum(k - 60.0, 0.0) + np.where(k < 200.0, 0.0, 1e-3 * np.sin((k - 200.0) / 3.0))
+    values: dict[str, Value] = {"averaging": True, "Np": NP, "p": NP, "t_init": 0.0}
+    x = np.concatenate((np.full(NP, 0.05), x_d + 0.05))[:400]
+    x_h = run(new_stream(), x_d, x, values)[NP:, OUTPUTS[PREDICTOR].index("x_h")]
+    assert np.abs(x_h[NP : 200 + NP] - 0.05).max() < 4e-3
+
+
 @cache
 def servo_of_library(Np: int) -> dict[str, Array]:
     return of_servo(LookAheadStream(PREDICTOR), "to and fro", Np)[0]

@@ -205,8 +205,8 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
 
 #endif
 
-/* Inputs -----------------------------------------------------------------------------------------------------------
- * A step in progress (hsep_clock.h). */
+/* Inputs: they are latched at the instants within a communication step, and executed in the step that reaches the next
+ * instant. A step in progress. */
 typedef struct {
     hsep_clock_step counted;
     int64_t n_latched, n_executed; /* of the instants that the step has */

@@ -31,9 +31,8 @@ and on the correlation that a window shows."""
 _LAG_BOUND = 10.0  # largest lag within a window, relative to the bound on a prediction: what is beyond has diverged
 
 _MOVES, _LEAST_MOVE = 4.0, 1e-6
-"""Bound on the mean square of a feature's effect, relative to that of the residuals about where they began, and the
-least one, relative to that of the residuals: the zeros of command and measurement may be apart, or an axis sag, by a
-hundred times what disturbances move it by."""
+"""Mean square of a feature's effect, relative to that of the residuals about the level of their run, and the least one,
+relative to theirs: zeros may be apart, or an axis sag, by a thousand times what disturbances move it by."""
 
 _RESOLUTION = 1e-13
 """Least variance of the noise, and least sum of the squares of the rows about the weights, relative to the sum of the
@@ -45,12 +44,12 @@ squares of the targets: the C core has it from a Gram matrix, which does not res
 class ResidualScale:
     """Size of the residuals so far."""
 
-    largest_square: float = 0.0  # m²: largest mean square of a window, and about the level where its run began at rest
-    largest_move: float = 0.0
+    largest_square: float = 0.0  # m²: largest mean square of a window
+    largest_move: float = 0.0  # m²: the same about the level of the window's run
     largest: float = 0.0  # m: largest magnitude
 
     def follow(self, residuals: Array, level: float) -> ResidualScale:
-        """Return the scale with another window of residuals, ``(n,)``, m, n ≥ 1; ``level``, m: of its run at rest."""
+        """Return the scale with another window of residuals, ``(n,)``, m, n ≥ 1; ``level``, m: of their run."""
         mean_square, move = float(np.mean(residuals**2)), float(np.mean((residuals - level) ** 2))
         largest = max(self.largest, float(np.abs(residuals).max()))
         return ResidualScale(max(self.largest_square, mean_square), max(self.largest_move, move), largest)
@@ -236,7 +235,7 @@ class Expert(ABC):
 
     @abstractmethod
     def forecast(self, at: ExpertWindow) -> Array | float:
-        """Return what it adds to the physics model, ``(n,)``, m; 0 where it knows nothing."""
+        """Return what it adds to the physics model, ``(n,)``, m; where it knows nothing 0, or as its class says."""
 
 
 @dataclass(frozen=True)
@@ -304,10 +303,17 @@ class Regression(Expert):
         return at.solved[self].predict(rows, model.run.past[kind], square, most, held, counts)
 
     def forecast(self, at: ExpertWindow) -> Array | float:
-        """Return what it adds to the physics model, within bounds; before a motion faster than all so far HOLD's."""
+        """Return what it adds to the physics model, within bounds.
+
+        Where it knows nothing of the physics model's residual it holds that, and its level where the command turns.
+        """
+        model = at.model
         if self not in at.predictions:
-            return HOLD.forecast(at) if self.target == MODEL_RESIDUAL and not self.is_fresh else 0.0
-        e_h, model = at.predictions[self].e_h, at.model
+            if self.target == COMMAND_RESIDUAL or self.is_fresh:
+                return 0.0
+            turned = model.static.turned(model.run.static, at.rows)
+            return np.asarray(HOLD.forecast(at) + (model.run.level or 0.0) * turned)
+        e_h = at.predictions[self].e_h
         if self.like(model).target == MODEL_RESIDUAL:
             return e_h
         command, most = model.command.late(model.run.commands, at.window.x_d), at.growth * at.bound

@@ -47,6 +47,7 @@ from .recall import Memory
 from .stacking import Stack
 from .warm_start import WarmStartRows
 
+_LITTLE = 0.1  # motion of the command, relative to a residual, beside which that is an offset
 _AHEAD = 20
 """Samples before the end of a window, half of it at most, at which the noise variances for the next solve are frozen.
 
@@ -64,7 +65,7 @@ class RunState:
     gate: InnovationGate
     n_rejected: int  # measurements that were missing or not plausible
     memory: Memory  # of this run and earlier ones
-    # m: mean residual of the first window that was learned, if the command rested in it, else 0; None before
+    # m: mean residual of the first window that is learned, 0 if the command moved in it by more than a little
     level: float | None = None
 
     @classmethod
@@ -116,7 +117,7 @@ class AveragedForecast(Forecast):
 
     scales: FeatureScales
     x: Array  # (n,), m: position that the stiffness acts at
-    stacked: Array  # (n_experts, n), m: predictions that are stacked; 0 where an expert knows nothing
+    stacked: Array  # (n_experts, n), m: predictions that are stacked
     predictions: Mapping[Regression, ExpertPrediction]  # of the regressions that know something
     # (n_experts,): weights of the experts: RECALL counts as far as the commands are alike, the others for the rest
     shares: Array
@@ -342,8 +343,9 @@ class AveragedModel:
         rows, static = self.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
         if fold:
             if level is None and accepted.any():
-                moved = self.static.peak_velocity(np.append(run.static.x_d, window.x_d), window.start) > 0.0
-                level = 0.0 if moved else float(np.mean(e[accepted]))
+                level = float(np.mean(e[accepted]))
+                if np.ptp(np.append(window.x_d, run.static.x_d)) > _LITTLE * abs(level):
+                    level = 0.0
                 state = replace(state, run=replace(run, level=level))
             of_command = self.command.rows(run.commands, window.x_d)
             state = _folded(state, forecast, (rows, of_command), (e, e_0), accepted)

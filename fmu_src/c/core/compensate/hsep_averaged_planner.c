@@ -125,6 +125,7 @@ static hsep_real averaged_planner_doubt(hsep_averaged_planner *self, const hsep_
     return sum;
 }
 
+/* Samples that the splines begin with, which are solved for. */
 static hsep_int *averaged_planner_begins(hsep_averaged_planner *self) { return hsep_part(self, self->begins); }
 
 /* A spline with this distance of knots. */
@@ -370,7 +371,8 @@ static void averaged_planner_take(hsep_averaged_planner *self, const hsep_planne
     self->share = hsep_fmax(self->share * (1.0 + HSEP_PLANNING_TAKEN_BACK * cosine), HSEP_PLANNING_LEAST_SHARE);
     self->share = hsep_fmin(self->share, 1.0);
     const hsep_real gain = self->cost_of_rest - self->cost;
-    const hsep_real share = gain > 0.0 ? self->share / (1.0 + HSEP_PLANNING_DOUBT * self->doubt / gain) : 0.0;
+    const hsep_real left = gain > 0.0 ? 1.0 / (1.0 + HSEP_PLANNING_DOUBT * self->doubt / gain) : 0.0;
+    const hsep_real share = left > 0.0 ? self->share * left : 0.0; /* not NaN */
     for (hsep_int i = 0; i < self->n; i++) {
         corrected[i] = share * (best[i] - rest[i]);
         best[i] = rest[i] + corrected[i];

@@ -49,9 +49,9 @@ typedef struct {
     hsep_int pause;         /* and after the next of its plans that runs away */
     hsep_real cost;         /* m2, of the best plan so far, */
     hsep_real cost_of_rest; /* and of the remainder of the last plan */
-    hsep_real doubt;        /* m2, variance of that, weighted as its errors */
+    hsep_real doubt;        /* m2, variance under the last plan's, weighted as errors; a plan that ends has none */
     hsep_real bound;        /* share of change_max that bounds the averaged model's plan */
-    hsep_real share;        /* of its change of the last plan that was taken last */
+    hsep_real share;        /* of its change of the last plan that was taken last, but for what it doubts */
     hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
     hsep_real left;         /* and that this part and all after it nearly always take */
     /* Offsets in words from the beginning of the struct */

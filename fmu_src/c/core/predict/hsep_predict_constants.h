@@ -73,6 +73,7 @@
 #define HSEP_RECALL_ALIKE HSEP_TINY(1e-100)
 
 /* hybridsep/predict/averaging/model.py */
+#define HSEP_AVERAGING_LITTLE 0.1
 #define HSEP_AVERAGING_AHEAD 20
 
 /* hybridsep/predict/averaging/constants.py */

@@ -116,27 +116,23 @@ static void averaged_begin(hsep_averaged *self, const hsep_real x_d[], const hse
     }
 }
 
-/* What is held at places begin ... end - 1: the last residual, m, as long as the command does not turn. */
+/* What is held at places begin ... end - 1: the last residual, m, as long as the command does not turn. Experts of the
+ * physics model's residual that know nothing, as before the first motion or a much faster one, hold it, too, and the
+ * run's level where the command turns. */
 static void averaged_hold(hsep_averaged *self, hsep_real last, hsep_int begin, hsep_int end)
 {
     const hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
     const hsep_real *rows = hsep_at(self, self->rows), hold = hsep_clip(last, self->bound);
-    hsep_real *stacked = hsep_at(self, self->stacked) + HSEP_HOLD * self->n;
-    for (hsep_int j = begin; j < end; j++) {
-        const hsep_real *row = rows + (self->n - 1 - j) * disturbances->n;
-        stacked[j] = hold * (1.0 - hsep_disturbances_turned(disturbances, row));
-    }
-}
-
-/* Before a motion faster than all so far the experts of the physics model's residual know nothing: they hold, too. */
-static void averaged_hold_unknown(hsep_averaged *self, hsep_int begin, hsep_int end)
-{
     static const hsep_int known_later[] = {HSEP_ARX_RESIDUAL, HSEP_STATIC};
     hsep_real *stacked = hsep_at(self, self->stacked);
-    for (hsep_int i = 0; i < 2; i++) {
-        if (!self->predicted[known_later[i]]) {
-            hsep_real *of_expert = stacked + known_later[i] * self->n;
-            memcpy(of_expert + begin, stacked + HSEP_HOLD * self->n + begin, (size_t)(end - begin) * sizeof(hsep_real));
+    for (hsep_int j = begin; j < end; j++) {
+        const hsep_real *row = rows + (self->n - 1 - j) * disturbances->n;
+        const hsep_real turned = hsep_disturbances_turned(disturbances, row);
+        stacked[HSEP_HOLD * self->n + j] = hold * (1.0 - turned);
+        for (hsep_int i = 0; i < 2; i++) {
+            if (!self->predicted[known_later[i]]) {
+                stacked[known_later[i] * self->n + j] = hold * (1.0 - turned) + self->level * turned;
+            }
         }
     }
 }
@@ -231,7 +227,6 @@ HSEP_API void hsep_averaged_go_on(
         }
     }
     averaged_hold(self, e[self->n], begin, end);
-    averaged_hold_unknown(self, begin, end);
     averaged_stack(self, e, begin, end);
 }
 

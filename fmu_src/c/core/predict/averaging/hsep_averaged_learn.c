@@ -291,13 +291,16 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
     }
 }
 
-/* The level of a run: the mean of its first window's residuals, if the command rested in it, else 0. */
+/* The level of a run: the mean of its first window's residuals, if the command moved by little beside it, else 0. */
 static void averaged_level(hsep_averaged *self, const hsep_real x_d[], const hsep_real e[])
 {
-    const hsep_real moves = hsep_disturbances_peak_velocity(hsep_averaged_disturbances(self), x_d, self->Np);
-    if (!(moves > 0.0)) {
-        self->level = hsep_dot(hsep_at(self, self->accepted), e, self->Np) / self->n_accepted;
+    const hsep_real level = hsep_dot(hsep_at(self, self->accepted), e, self->Np) / self->n_accepted;
+    hsep_real least = hsep_averaged_disturbances(self)->before.x_d, most = least;
+    for (hsep_int j = 0; j < self->Np; j++) {
+        least = hsep_fmin(least, x_d[j]);
+        most = hsep_fmax(most, x_d[j]);
     }
+    self->level = most - least <= HSEP_AVERAGING_LITTLE * hsep_fabs(level) ? level : 0.0;
     self->is_levelled = 1;
 }
 

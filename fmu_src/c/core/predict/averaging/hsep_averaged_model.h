@@ -54,7 +54,7 @@ typedef struct {
     hsep_gate reach;
     hsep_int n_rejected;  /* samples of this run that were not accepted */
     hsep_int is_levelled; /* whether its first window is learned, */
-    hsep_real level;      /* m, and the mean residual in it, if the command rested, else 0 */
+    hsep_real level;      /* m, and the mean residual in it, if the command moved by little beside it, else 0 */
     /* Of the window that is predicted */
     hsep_real forecast_scale;           /* m/s, velocity scale with it, */
     hsep_real forecast_step;            /* m, and largest change of the command, */
@@ -75,13 +75,13 @@ typedef struct {
     hsep_int measured;         /* (Np,) m, measured position, relative to the start, NaN where missing */
     hsep_int accepted;         /* (Np,) whether it is believed */
     hsep_int e_0;              /* (Np + p of the command,) m, residual of the command */
-    hsep_int stacked;  /* (HSEP_N_EXPERTS, n) m, what experts add to the physics model; 0 where one knows nothing */
-    hsep_int ahead;    /* (n_ahead, HSEP_N_EXPERTS, Np) m, what is stacked half a plan ahead, oldest first */
-    hsep_int n_ahead;  /* windows of half a plan; 0 without a compensator */
-    hsep_int recalled; /* (n,) m, what HSEP_RECALL predicts */
-    hsep_int e_h;      /* (n,) m, residual that is predicted */
-    hsep_int variance; /* (n,) m2, of the mixture of the experts */
-    hsep_int rows;     /* (n, n_static) features without lags, sample after sample */
+    hsep_int stacked;          /* (HSEP_N_EXPERTS, n) m, what experts add to the physics model */
+    hsep_int ahead;            /* (n_ahead, HSEP_N_EXPERTS, Np) m, what is stacked half a plan ahead, oldest first */
+    hsep_int n_ahead;          /* windows of half a plan; 0 without a compensator */
+    hsep_int recalled;         /* (n,) m, what HSEP_RECALL predicts */
+    hsep_int e_h;              /* (n,) m, residual that is predicted */
+    hsep_int variance;         /* (n,) m2, of the mixture of the experts */
+    hsep_int rows;             /* (n, n_static) features without lags, sample after sample */
     hsep_int disturbances, command, recall;
     hsep_int evidence[HSEP_N_RESIDUALS];
     hsep_int experts[HSEP_N_EXPERTS]; /* hold has none, 0 */

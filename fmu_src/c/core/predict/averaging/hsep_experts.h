@@ -14,7 +14,7 @@
 /* Size of the residuals so far. */
 typedef struct {
     hsep_real largest_square; /* m2, largest mean square of a window, */
-    hsep_real largest_move;   /* m2, and about the level where its run began at rest */
+    hsep_real largest_move;   /* m2, and about the level of its run */
     hsep_real largest;        /* m, largest magnitude */
 } hsep_residual_scale;
 
@@ -53,7 +53,7 @@ HSEP_ASSERT_WORDS(hsep_expert_errors, 2);
 HSEP_ASSERT_WORDS(hsep_expert, 17);
 
 /* Take another window of residuals, (n,), m, into a scale; accepted: (n,), 1 where it counts; count: how many do;
- * level: m, of its run at rest. */
+ * level: m, of their run. */
 HSEP_API void hsep_residual_scale_follow(
     hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count,
     hsep_real level);
