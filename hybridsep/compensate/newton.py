@@ -314,10 +314,6 @@ class AveragedPlanner:
         cost = float(error @ error) + self._jerk_weight * float(third @ third)
         return PlannedPoint(coefficients, self._unchanged if change is None else change, at, x_h, third, cost)
 
-    def doubt(self, point: PlannedPoint) -> float:
-        """Return the variance of what is predicted under a plan, over all of it, weighted as its errors, m²."""
-        return float(self._basis.weight**2 @ point.prediction.variance[-self._basis.preview :])
-
     def plan(
         self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_followed: int, passed: Array
     ) -> PlannedPoint:

@@ -350,7 +350,8 @@ class AveragedPlanning(Planning):
                     if not is_away:
                         step, gain = hybrid.coefficients - previous_plan, last.cost - hybrid.cost
                         share = self._share_of(step)
-                        left = 1.0 / (1.0 + _DOUBT * planner.doubt(last) / gain) if gain > 0.0 else 0.0
+                        doubt = float(self.basis.weight**2 @ last.prediction.variance[-self.horizon :])
+                        left = 1.0 / (1.0 + _DOUBT * doubt / gain) if gain > 0.0 else 0.0
                         step *= share * left if left > 0.0 else 0.0  # not NaN
                         return ChosenPlan(SepState.HYBRID, previous_plan + step, scales, share=share)
             if is_better(last.cost, of_physics.cost):

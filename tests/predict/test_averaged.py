@@ -79,15 +79,6 @@ def test_an_unstable_recursion_is_bounded_by_the_residuals_so_far(rate: float, g
     assert runaway > 2.0
 
 
-def test_before_anything_is_learned_it_is_the_physics_model() -> None:
-    predictor = averaged()
-    for command in (cycles(100), cycles(250) + 0.3):
-        prediction = predictor.predict(command)
-        np.testing.assert_array_equal(prediction.e_h, 0.0)
-        np.testing.assert_array_equal(prediction.x_h, prediction.x_pb)
-        assert prediction.active.all()
-
-
 @pytest.mark.parametrize("start", [0.0, 0.3])
 def test_without_a_residual_nothing_is_predicted(start: float) -> None:
     predictor, x_d = averaged(), start + cycles(1500)

@@ -100,8 +100,7 @@ def closed_loop(
 
     ``model``: a look-ahead; ``n``: samples; ``values``: parameters; ``start``: position of rest, m; ``weights``:
     saved predictor that the look-ahead starts warm with; ``size``: of the path, as a fraction; ``delay``: samples by
-    which its output arrives late; at rest before; ``path``: {"staircase", "spiral"}: the spiral is the X axis' part
-    of it.
+    which its output arrives late; at rest before; ``path``: {"staircase", "spiral"}, of which the X axis is taken.
     """
     given = {**(values or {}), "x_d_ahead": start, "x_meas": start}
     return _closed_loop(model, n, tuple(given.items()), weights, size, sensor, delay, path)

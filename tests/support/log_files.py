@@ -72,8 +72,7 @@ def twincat_csv(
     """Return an export of TwinCAT Scope as Beckhoff's manual describes it.
 
     ``mark``: between fields; numbers have a decimal comma unless it is one; ``full``: whether times are Windows file
-    times; otherwise they are milliseconds; ``shared``: whether neighbours that are sampled alike share a column of
-    times.
+    times, else milliseconds; ``shared``: whether neighbours that are sampled alike share a column of times.
     """
     start = 132_959_733_843_760_000
 

@@ -1,10 +1,7 @@
 """The staircase experiment of the paper, made independently of the library's own plant and trajectory.
 
-Six 10 mm moves, one at the start of each second, three up and three down, on the nonlinear drive
-
-``m ẍ + c ẋ + k x + c_nl ẋ|ẋ| + k_nl x|x| = c ẋ_d + k x_d``
-
-with ``x_d`` held over each millisecond.
+Six 10 mm moves, one at the start of each second, three up and three down, on the nonlinear drive ``m ẍ + c ẋ + k x +
+c_nl ẋ|ẋ| + k_nl x|x| = c ẋ_d + k x_d`` with ``x_d`` held over each millisecond.
 """
 
 from functools import lru_cache

@@ -31,8 +31,7 @@ def simulate(
     """Return the true positions of drives at rest at their first command.
 
     ``models``, ``disturbances``: sequences of m ModalModel and Disturbances: linear parts, of at most 4 modes, and
-    nonlinearities; ``commands``: sequence of m (n_i,), m: held over each millisecond. Returns ``x``: list of m
-    (n_i,), m.
+    nonlinearities; ``commands``: sequence of m (n_i,), m: held over each millisecond. As many are returned.
     """
     n = max(len(command) for command in commands)
     u = np.zeros((n, len(commands)))
@@ -102,8 +101,7 @@ def _tables(model: ModalModel, h: float) -> tuple[Array, Array, Array, Array]:
     """Return the exact step by ``h``, s, of each mode, and its outputs.
 
     Returns ``A``, (2, 2, 4); ``B``, (2, 4); ``command``, (2, 4): output weights of the response to the command;
-    ``force``, (2, 4): output weights of the response to a force at the tool: every mode in phase, without zeros,
-    static gain 1.
+    ``force``, (2, 4): of that to a force at the tool: every mode in phase, without zeros, static gain 1.
     """
     A, b, c = model.state_space()
     step, gain = np.zeros((2, 2, MODES_MAX)), np.zeros((2, MODES_MAX))
