@@ -122,8 +122,7 @@ def test_zeros_that_are_apart_cost_no_accuracy(new_stream: StreamMaker, offset: 
 
     def error(zero: float) -> float:
         measured = np.concatenate((np.full(NP, zero), x + zero))[: len(x)]
-        outputs = run(new_stream(), x_d, measured, values)
-        x_h = outputs[2 * NP : -1, OUTPUTS[PREDICTOR].index("x_h")]
+        x_h = run(new_stream(), x_d, measured, values)[2 * NP : -1, OUTPUTS[PREDICTOR].index("x_h")]
         return rms(x[NP : NP + len(x_h)] + zero - x_h)
 
     assert error(offset) < 1.3 * error(0.0)
