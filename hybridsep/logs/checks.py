@@ -363,8 +363,7 @@ def _note_rate(log: Log) -> Iterator[Finding]:
         options = (("--resample", "at even times, linearly between samples"),)
         yield Finding("rate", words, {"n": float(len(where)), "largest": largest}, options=options)
     if log.T_s > _SLOW:
-        words = f"the samples are {log.T_s:.3g} s apart: were milliseconds given as s?"
-        yield Finding("slow samples", words, {"T_s": log.T_s})
+        yield Finding("slow samples", f"samples are {log.T_s:.3g} s apart: were ms given as s?", {"T_s": log.T_s})
 
 
 def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterator[Finding]:

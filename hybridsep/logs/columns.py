@@ -88,6 +88,8 @@ def _positions(source: Source, given: Mapping[str, str], axis: str | None) -> tu
     """
     axes = source.axes or axes_of(source.names)
     chosen = {role: _name(source, role, given[role]) for role in ("x_d", "x") if role in given}
+    if not any(chosen.values()) and set(given.values()) == {"x_d"}:  # a trajectory's column of another name
+        return dict.fromkeys(("x_d", "x"), _positions(source, {}, axis)[0]["x_d"]), []
     if axis is not None:
         x_d, x = _of_axis(source, axes, axis)
         return {"x_d": x_d, "x": x, **chosen}, []
@@ -173,11 +175,11 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     what = ", ".join(repr(name) if name == role else f"{brief(name)} ({role})" for role, name in names.items())
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
     options = " ".join(f"--{role} NAME" for role in names)
-    other = " (or --T_s SECONDS instead of --t)" if "t" in names else ""
+    options += " (or --T_s SECONDS instead of --t)" if "t" in names else ""
     of_python = f"; in Python by columns={{{', '.join(f'{role!r}: NAME' for role in names)}}}"
     of_python += ", or T_s=SECONDS" if "t" in names else ""
-    there = listed(source.names)
-    return LogError(f"{source.path}: {which} missing, the file has {there}; name {it}: {options}{other}{of_python}")
+    there = f"{which} missing, the file has {listed(source.names)}"
+    return LogError(f"{source.path}: {there}; name {it}: {options}{of_python}")
 
 
 def _stated(source: Source, name: str) -> str:

@@ -79,7 +79,7 @@ def test_build(hybridsep: Run, tmp_path: Path) -> None:
 def test_cosim_over_a_file(hybridsep: Run, tmp_path: Path) -> None:
     path = tmp_path / "command.csv"
     rows = np.column_stack((np.arange(1500) * 1e-3, commanded()[:1500]))
-    np.savetxt(path, rows, delimiter=",", header="t,x_d", comments="")
+    np.savetxt(path, rows, delimiter=",", header="t,Sollposition", comments="")  # by a known name, as fit has it
     options = ("--set", "plant.seed=2", "--out", tmp_path / "run.npz", "--figure", tmp_path / "made" / "run.png")
     out = hybridsep.done("cosim", "--trajectory", path, *options, "--json")
     assert (tmp_path / "made" / "run.png").read_bytes().startswith(b"\x89PNG")
