@@ -84,7 +84,7 @@ FINDINGS: Mapping[str, Explanation] = {
         "Name the column of the measured position with `--x`.",
     ),
     "wraps": Explanation(
-        "A position jumps by 2¹⁶ of its smallest steps, and goes on behind the jump as before it: a counter wraps.",
+        "A position jumps by 2¹⁶ of its smallest steps, and goes on after the jump as before it: a counter wraps.",
         "Unwrap it before, as by `numpy.unwrap(x, period=...)` with the message's period, or record it with more bits.",
     ),
     "unit": Explanation(
@@ -124,7 +124,7 @@ FINDINGS: Mapping[str, Explanation] = {
         "Record in the controller's own cycle rather than by a PC's clock, or take it at even times: `--resample`.",
     ),
     "slow samples": Explanation(
-        "The samples are more than 0.1 s apart, which controllers of drives are not.",
+        "The samples are more than 0.1 s apart; a drive's controller samples faster.",
         "If milliseconds were read as seconds, state the unit in the column's name, as in `t [ms]`, or give `--T_s`.",
     ),
     "outliers": Explanation(
@@ -156,7 +156,7 @@ FINDINGS: Mapping[str, Explanation] = {
         "beside its command, as under gravity in a position loop without an integrator. The columns do not tell which.",
         "A prediction needs none: the offset is learned. A compensator moves the axis by it. That is right where the "
         "axis stands beside its command. Where only the zeros differ, take the offset away from the measured column, "
-        "and from what the compensator measures, before it moves the axis. Where the offset is ten times all that the "
+        "and from what the compensator measures, before it moves the axis. Where the offset is ten times what the "
         "error varies by, the limits that `fit` estimates leave it out, and the compensator trips at once.",
     ),
     "start in motion": Explanation(

@@ -4,9 +4,9 @@ With the paper's model a plan is on eq. (3), and on the physics model where the 
 soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan. Where its
 own plan runs away, it plans none for a time, and one that ends compensation is judged in place of the remainder; that
 is followed, too, where compensation is switched off, or has tripped. It weighs its experts by their errors in the
-window and half a plan ahead, so that the expert of the next 20 ms alone does not plan what comes behind them. Where its
-own plan takes back what the last one has changed, a share of it is taken. A motion faster than all of its run is
-compensated with at most half of the largest change.
+window and half a plan ahead, so that the expert of the next 20 ms does not plan what comes after them. Of what its own
+plan changes a share is taken: less where it takes back what the last one has changed, or gains little beside the
+variance of predictions. A motion faster than all of its run is compensated with half of the largest change at most.
 """
 
 import math
@@ -44,7 +44,7 @@ class PendingPlan:
     stop: Array  # (n,), m: coefficients of its stop, where the plan is longer than the preview
     state: SepState  # model of the plan
     runs_away: bool  # whether the residual model's plan ran away, so that it plans none for a time
-    share: float  # of the residual model's change of the last plan that is taken
+    share: float  # of the residual model's change of the last plan that is taken, but for what it doubts
     correction: Array  # (3 + n_free,), m: what is taken, before a stop shortens the plan; 0 of any other plan
 
 
@@ -69,7 +69,7 @@ class ChosenPlan(NamedTuple):
     coefficients: Array  # (3 + n_free,), m
     scales: FeatureScales | None  # of the residual model's features
     runs_away: bool = False  # whether the residual model's plan ran away
-    share: float | None = None  # of the residual model's change of the last plan that is taken, if it planned
+    share: float | None = None  # as :class:`PendingPlan` has it, if the residual model planned
 
 
 class PublishedPosition(NamedTuple):
@@ -91,7 +91,7 @@ class Planning(ABC):
     # shape (n_ahead, n_experts, Np), in m: entry i is what is stacked for the i-th window from this one, by the plan of
     # half a plan before it, the last one by this window's; NaN where nothing is known; with the paper's model none
     ahead: Array
-    share: float  # of the residual model's change of a plan that was taken last, but for what it doubts
+    share: float  # of the last plan
     corrected: Array  # (3 + n_free,), m: ``correction`` of the last plan, by the splines of the next one
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:

@@ -295,11 +295,6 @@ class Tracking:
                 f"The largest servo error of the log, {shown.words(self.largest, '.4g')}, is above change_max: "
                 f"{left} of it cannot be compensated."
             )
-        if 0.0 < self.following_error_max < self.none.largest:
-            lines[-1] += (
-                " The log's own error is above following_error_max, so the compensator may trip at once: take what the "
-                "zeros are apart from the measurement or, where the axis sags, give both limits."
-            )
         if self.held > 1:
             lines.append(
                 f"The log's commands are held, or rounded to the same, for {self.held} samples each; where their steps "
@@ -313,14 +308,22 @@ class Tracking:
                     f"The log's commands reach {reached:.4g} {unit}/s{power}, above {name} = {most:.4g} "
                     f"{unit}/s{power}: where they do, it bounds what the compensator adds; is it the drive's?"
                 )
+        trips = (
+            f"Where the measured following error is above following_error_max = {monitored} for three samples in a "
+            "row, the compensator trips: its change of the command fades until reset."
+            if monitored
+            else "following_error_max is 0: nothing trips."
+        )
+        if monitored and self.following_error_max < self.none.largest:
+            trips += (
+                " The log's own error is above it, so the compensator may trip at once: take what the zeros are apart "
+                "from the measurement or, where the axis sags, give both limits."
+            )
         return [
             *lines,
             *(self.costs.lines(shown) if self.costs is not None else ()),
             *(self.look_aheads.lines() if self.look_aheads is not None else ()),
-            f"Where the measured following error is above following_error_max = {monitored} for three samples in a "
-            "row, the compensator trips: its change of the command fades until reset."
-            if monitored
-            else "following_error_max is 0: nothing trips.",
+            trips,
             _HOW,
         ]
 

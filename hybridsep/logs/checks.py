@@ -105,8 +105,7 @@ def checked(log: Log) -> tuple[Finding, ...]:
 @np.errstate(all="ignore")  # a log may hold any finite number
 def check(log: Log) -> tuple[Finding, ...]:
     """Return all findings on a log, those for which it is refused first."""
-    hopeless = tuple(_hopeless(log))
-    if hopeless:
+    if hopeless := tuple(_hopeless(log)) or tuple(_wraps(log)):
         return hopeless
     part = _liveliest(log)
     x_d, x = log.x_d[part], log.x_meas[part].copy()
@@ -143,12 +142,10 @@ def _hopeless(log: Log) -> Iterator[Finding]:
             "simulated; name the measured position's column (--x NAME)"
         )
         yield Finding("same column", words, {"n": float(n)}, refused=True)
-    else:
-        yield from _wraps(log)
 
 
 def _wraps(log: Log) -> Iterator[Finding]:
-    """Find positions that jump by all that a counter counts, and go on behind the jump as before it."""
+    """Find positions that jump by all that a counter counts, and go on after the jump as before it."""
     for name, column in (("commanded", "x_d"), ("measured", "x_meas")):
         signals = [getattr(one, column) for one in log.segments()]
         x, jumps = np.concatenate(signals), np.concatenate([np.diff(one) for one in signals])

@@ -116,7 +116,7 @@ def moves_to_and_fro() -> tuple[Array, Array]:
 @on_all((PREDICTOR,), needs="figures")
 @pytest.mark.parametrize("offset", [1e-3, 0.05])
 def test_zeros_that_are_apart_cost_no_accuracy(new_stream: StreamMaker, offset: float) -> None:
-    """Before a motion faster than all so far nothing was predicted, behind it features had to explain the offset."""
+    """At the first motion nothing was predicted, and after it features had to explain the offset."""
     x_d, x = moves_to_and_fro()
     values: dict[str, Value] = {"averaging": True, "Np": NP, "p": NP, "q": 3, "t_init": 0.0}
 

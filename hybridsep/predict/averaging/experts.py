@@ -305,7 +305,7 @@ class Regression(Expert):
     def forecast(self, at: ExpertWindow) -> Array | float:
         """Return what it adds to the physics model, within bounds.
 
-        Where it knows nothing of the physics model's residual it holds that, and its level where the command turns.
+        While it knows nothing of the physics model's residual: the last one, or their level where the command turns.
         """
         model = at.model
         if self not in at.predictions:

@@ -335,18 +335,18 @@ class AveragedModel:
         window = forecast.window._replace(x_d=forecast.window.x_d[:m], x_pb=forecast.window.x_pb[:m])
         fastest = float(np.abs(np.diff(window.x_pb, prepend=run.static.x_pb[-1])).max())
         state = _with_scales(self, forecast, max(self.learned.fastest, fastest))
-        learned, measured, level = state.learned, x - window.x_pb, run.level
+        learned, measured = state.learned, x - window.x_pb
         largest, T_s = learned.scales[MODEL_RESIDUAL].largest, self.settings.T_s
         accepted, gate = gated(run.gate, measured, largest, learned.fastest, T_s)
         e = _bridged(forecast.e_h[:m], measured, accepted)
         e_0 = e + window.x_pb - self.command.late(run.commands, window.x_d)
         rows, static = self.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
         if fold:
-            if level is None and accepted.any():
+            if run.level is None and accepted.any():
                 level = float(np.mean(e[accepted]))
-                if np.ptp(np.append(window.x_d, run.static.x_d)) > _LITTLE * abs(level):
-                    level = 0.0
-                state = replace(state, run=replace(run, level=level))
+                rests = np.ptp(np.append(window.x_d, run.static.x_d)) <= _LITTLE * abs(level)
+                run = replace(run, level=level if rests else 0.0)
+                state = replace(state, run=run)
             of_command = self.command.rows(run.commands, window.x_d)
             state = _folded(state, forecast, (rows, of_command), (e, e_0), accepted)
             state = _judged(state, forecast, (e, e_0), accepted, ahead) if accepted.any() else state
@@ -354,7 +354,7 @@ class AveragedModel:
         n_rejected = run.n_rejected + m - int(accepted.sum())
         commands = np.concatenate((run.commands, window.x_d))[m:]
         memory = forecast.memory.remember(e)
-        run = RunState(static, commands, (past[0], past[1]), gate, n_rejected, memory, level)
+        run = RunState(static, commands, (past[0], past[1]), gate, n_rejected, memory, run.level)
         return replace(state, run=run), accepted
 
 
