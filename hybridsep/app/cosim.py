@@ -62,9 +62,9 @@ def cosim(
             raise ParameterError("-m, --trajectory, --compensate, --predictor, --plant and --weights are for one axis")
         _two_axes(axes or [], path, entries or (), unit, out=out, figure=figure, force=force, as_json=as_json)
         return
-    from ..compensate.expected import limits_that_bind
     from ..cosim.loop import cosimulate
     from ..fitting.compensation import Stretch
+    from ..fitting.expected import Trial, limits_that_bind
     from ..fitting.replay import Recording
     from ..fmi.archive import build_here
     from ..logs.units import shown_of
@@ -98,7 +98,7 @@ def cosim(
         if predictor is None and compensate not in (None, "off"):
             settings = replace(axis.compensator_settings, compensate=compensate)
             limits = limits_that_bind(run.x_d, run.x_dm, run.T_s, settings)
-            if limits and (stretch := Stretch.of(axis, [Recording(run.x_d, run.x, 0)])):
+            if limits and (stretch := Stretch.of(Trial(axis, controller), [Recording(run.x_d, run.x, 0)])):
                 advance("what limits cost", 0.0)
                 costs = stretch.limit_costs()
     if out is not None:

@@ -5,7 +5,7 @@ and ``x_d_ahead = r(k)``; then both step. The controller delays the trajectory, 
 samples more, and a run is recorded without the first fill. If the controller has a ``measurement_delay``, what is
 measured arrives that many samples later; a run has it as it was measured. With −1 it arrives a sample early: the drive
 steps before the controller, as under a sequential (Gauss-Seidel) master.
-Adapters: ``FmuController``, ``_LibraryController``, ``_OwnController``; ``FmuDrive``, ``_LibraryDrive``.
+Adapters: ``FmuController``, ``LibraryController``, ``_OwnController``; ``FmuDrive``, ``_LibraryDrive``.
 """
 
 import math
@@ -101,14 +101,14 @@ def cosimulate(
     unit = r.unit if isinstance(r, Log) else "m"
     command = as_samples(r.x_d if isinstance(r, Log) else r, "r")
     as_samples(command[:1], "r", 1)
-    ahead: FmuController | _LibraryController | _OwnController
+    ahead: FmuController | LibraryController | _OwnController
     if isinstance(controller, (str, Path)):
         _refuse(t_init, "t_init is for a controller of the library; an FMU's is among its controller_values")
         ahead = FmuController(controller, controller_values or {})
     else:
         _refuse(controller_values, "controller_values are for an FMU; make the controller with these parameters")
         if isinstance(controller, HybridPredictor | SepCompensator):
-            ahead = _LibraryController(controller, t_init)
+            ahead = LibraryController(controller, t_init)
         else:
             _refuse(t_init, "t_init is for a controller of the library; a compensator of your own has none")
             ahead = _OwnController(controller)
@@ -172,7 +172,7 @@ def _refuse(given: object, message: str) -> None:
 # have ``name`` and the methods that the FMUs' describe. What an FMU reports is known after ``initialise``.
 
 
-class _LibraryController:
+class LibraryController:
     """A predictor or compensator after its look-ahead, with the FMU's timing; a run keeps what it has learned."""
 
     name: str = "the controller"  # in error messages
@@ -193,16 +193,20 @@ class _LibraryController:
         self.T_s, self.Np, self.late = predictor.T_s, predictor.Np, predictor.settings.measurement_delay
 
     def initialise(self, start: float) -> None:
+        """Begin a run at rest at ``start``, m."""
         self._look_ahead = LookAhead(self._controller, start, t_init=self._t_init)
 
     def outputs(self) -> tuple[tuple[float, ...], int]:
+        """Return the positions of the kind's outputs, m, and the state, now."""
         ahead, kind = self._look_ahead, self.kind
         return tuple(getattr(ahead, name) for name in kind.outputs), kind.state_offset + int(getattr(ahead, kind.state))
 
     def n_rejected(self) -> int:
+        """Return how many measurements were missing or not plausible."""
         return self._look_ahead.n_rejected
 
     def step(self, k: int, x_d_ahead: float, x_meas: float) -> None:
+        """Take in sample ``k``, m, and move on to the next."""
         self._look_ahead.sample(x_d_ahead, x_meas)
 
 

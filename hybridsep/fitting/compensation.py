@@ -7,11 +7,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..base.errors import ParameterError, SignalError
+from ..base.errors import FmuError, ParameterError, SignalError
 from ..base.metrics import ErrorSize, largest, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, CompensatorSettings, Limits
 from ..base.signals import Array
-from ..compensate.expected import Expected, expected_errors, limits_that_bind
 from ..compensate.planning import FASTER
 from ..cosim.inverse import FirInverse
 from ..identify.output_error import in_time
@@ -21,6 +20,7 @@ from ..machines.machine import Machine
 from ..model.physics import least_look_ahead
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
+from .expected import Expected, Trial, limits_that_bind
 from .replay import Recording, beginnings, replay
 
 MARGINS = np.array([1.25, 2.0, 5.0])
@@ -183,7 +183,7 @@ class Ahead:
 
     preview: int  # samples
     left: float  # RMS of the error that is left, m
-    limits: Mapping[str, float]  # as of :func:`~hybridsep.compensate.expected.limits_that_bind`
+    limits: Mapping[str, float]  # as of :func:`~hybridsep.fitting.expected.limits_that_bind`
 
 
 @dataclass(frozen=True)
@@ -257,7 +257,7 @@ class Tracking:
     physics: ErrorSize
     hybrid: ErrorSize
     inverse: ErrorSize  # estimate with the rival, fitted to the training samples; NaN without motion there
-    # model → shares of :func:`~hybridsep.compensate.expected.limits_that_bind`
+    # model → shares of :func:`~hybridsep.fitting.expected.limits_that_bind`
     limits: Mapping[str, Mapping[str, float]]
     costs: LimitCosts | None  # on the stretch of ``look_aheads``; None where no limit binds the hybrid
     # largest change of the command, and following error above which the compensator trips, m
@@ -349,16 +349,17 @@ def expected_tracking(
     """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost."""
     allowed, first = machine.compensator_settings, beginnings(recordings, _TRIED_MAX)
     settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
-    judged = {model: _expected(machine, one, first) for model, one in settings.items()}
-    progress(0.8)
-    bound = {
-        model: limits_that_bind(one.x_d, one.x_dm, machine.compensator_predictor.T_s, allowed)
-        for model, one in judged.items()
-        if len(one.x_d)
-    }
-    stretch = Stretch.of(machine, recordings)
-    costs = stretch.limit_costs() if stretch and bound.get("hybrid") else None
-    ahead = stretch.look_aheads() if stretch else None
+    with Trial.of(machine) as trial:
+        judged = {model: _expected(trial, one, first) for model, one in settings.items()}
+        progress(0.8)
+        bound = {
+            model: limits_that_bind(one.x_d, one.x_dm, machine.compensator_predictor.T_s, allowed)
+            for model, one in judged.items()
+            if len(one.x_d)
+        }
+        stretch = Stretch.of(trial, recordings)
+        costs = stretch.limit_costs() if stretch and bound.get("hybrid") else None
+        ahead = stretch.look_aheads() if stretch else None
     progress(1.0)
     without = max((one.without for one in judged.values()), key=len)
     none, physics, hybrid = map(ErrorSize.of, (without, *(one.compensated for one in judged.values())))
@@ -379,15 +380,16 @@ class Stretch:
     Nothing is learned, and no residual is added: of a drive that differs from its model more is left.
     """
 
-    machine: Machine
+    trial: Trial
     # (n,), m: commands, from rest at 0 to rest, and the model's response to them
     x_d: Array
     x: Array
     judged: slice  # samples that are judged
 
     @classmethod
-    def of(cls, machine: Machine, recordings: Sequence[Recording]) -> "Stretch | None":
+    def of(cls, trial: Trial, recordings: Sequence[Recording]) -> "Stretch | None":
         """Return the stretch where the model alone errs most; None where it has no error to compensate."""
+        machine = trial.machine
         model, known = machine.model, machine.compensator_predictor
         discrete, n = model.discretise(known.T_s, known.input_hold), min(_DEMANDING, 5 * machine.look_ahead)
         most, lead, steps = 0.0, n // 4, np.empty(0)
@@ -406,7 +408,7 @@ class Stretch:
         # and to it
         k = np.arange(len(steps))
         x_d = np.cumsum(np.sin(0.5 * np.pi * np.minimum(np.minimum(k, k[::-1]) / lead, 1.0)) ** 2 * steps)
-        found = cls(machine, x_d, discrete.forced_response(discrete.rest(), x_d)[0], slice(lead, -lead))
+        found = cls(trial, x_d, discrete.forced_response(discrete.rest(), x_d)[0], slice(lead, -lead))
         return found if found.off > _LITTLE * largest_motion(recordings, known.T_s)[1] else None
 
     @property
@@ -416,9 +418,8 @@ class Stretch:
 
     def expected(self, settings: CompensatorSettings, Np: int) -> Expected:
         """Return the errors to be expected with a compensator's settings and ``Np`` samples in a window."""
-        known = replace(self.machine.compensator_predictor, Np=Np, p=1, q=0, measurement_delay=0)
-        physics, pair = replace(settings, compensate="physics"), (self.x_d, self.x)
-        (found,) = expected_errors(self.machine.model, known, physics, [pair], learn=False)
+        known = replace(self.trial.machine.compensator_predictor, Np=Np, p=1, q=0, measurement_delay=0)
+        (found,) = self.trial.expected(known, replace(settings, compensate="physics"), [(self.x_d, self.x)])
         return Expected(*(signal[self.judged] for signal in found))
 
     def limit_costs(self) -> LimitCosts:
@@ -426,7 +427,7 @@ class Stretch:
 
         One twice as large is advised where RMS falls and the largest error does not rise, also with all together.
         """
-        own, Np = self.machine.compensator_settings, self.machine.compensator_predictor.Np
+        own, Np = self.trial.machine.compensator_settings, self.trial.machine.compensator_predictor.Np
         least = _LITTLE * self.off
 
         def error_of(settings: CompensatorSettings) -> ErrorSize:
@@ -447,8 +448,9 @@ class Stretch:
 
     def look_aheads(self) -> LookAheads:
         """Return what plans leave with some look-aheads."""
-        known, own = self.machine.compensator_predictor, self.machine.compensator_settings
-        least, needed, tried = PARAMETERS["preview"].minimum, self.machine.look_ahead, []
+        machine = self.trial.machine
+        known, own = machine.compensator_predictor, machine.compensator_settings
+        least, needed, tried = PARAMETERS["preview"].minimum, machine.look_ahead, []
         chosen, sizes = own.preview or needed, (round(one / known.T_s) for one in _AHEAD)
         for preview in sorted({*(one for one in sizes if least <= one <= len(self.x_d)), chosen, needed}):
             settings, Np = own, known.Np
@@ -461,13 +463,14 @@ class Stretch:
         return LookAheads(tuple(tried), chosen, self.off, len(found.x_d) * known.T_s, known.T_s)
 
 
-def _expected(machine: Machine, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected:
+def _expected(trial: Trial, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected:
     """Return the errors to be expected over the test samples, one log after the other; empty where a plan diverges."""
-    settings, Np = machine.compensator_predictor, machine.compensator_predictor.Np
+    settings = trial.machine.compensator_predictor
+    Np = settings.Np
     firsts = [one.first_judged(Np) for one in recordings if len(one.x) > settings.n_late]
     try:
-        found = list(expected_errors(machine.model, settings, compensator, [(one.x_d, one.x) for one in recordings]))
-    except SignalError:
+        found = trial.expected(settings, compensator, [(one.x_d, one.x) for one in recordings])
+    except (SignalError, FmuError):
         return Expected(*[np.empty(0)] * 4)
     parts = [Expected(*(signal[first:] for signal in one)) for one, first in zip(found, firsts, strict=True)]
     return Expected(*map(np.concatenate, zip(*parts, strict=True)))

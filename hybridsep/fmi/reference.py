@@ -8,7 +8,6 @@ compare them with the FMU's.
 
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -79,11 +78,13 @@ def _played_rows(spec: FmuSpec) -> Rows:
 
 def _drive_rows(spec: FmuSpec) -> Rows:
     """Return the rows of a drive under the staircase."""
-    plant, encoder, rows = *_drive(spec.machine), Rows()
+    machine, rows = spec.machine, Rows()
+    assert machine.plant is not None  # by fmu_names
+    plant, encoder = machine.new_plant(), Encoder(machine.plant.noise_std, machine.plant.seed)
     plant.reset(spec.table.rest)
-    for x_d in _command(spec.machine, _SAMPLES):
+    for x_d in _command(machine, _SAMPLES):
         rows.append(([plant.x, plant.v, encoder.measure(plant.x)], [x_d]))
-        plant.step(x_d, spec.machine.T_s)
+        plant.step(x_d, machine.T_s)
     return rows
 
 
@@ -91,7 +92,7 @@ def _drive_rows(spec: FmuSpec) -> Rows:
 def _look_ahead_rows(spec: FmuSpec) -> Rows:
     """Return the rows of a look-ahead under the staircase, through two windows of prediction.
 
-    Behind it is a drive that measures what a command leads to, of a compensator the modified one.
+    What a command leads to, of a compensator the modified one, is measured at a linear drive.
     """
     machine, parameters, names = spec.machine, spec.table.parameters, list(spec.table.named("output"))
     settings = PredictorSettings.from_fmi(parameters)
@@ -104,7 +105,7 @@ def _look_ahead_rows(spec: FmuSpec) -> Rows:
     look_ahead = LookAhead(model, spec.table.rest, unit=machine.unit)
     warm_up = max(samples_before(settings.warm_up, machine.T_s), int(parameters.get("preview", 0)))
     n = min(max(_COMPENSATED_SAMPLES if compensates else _SAMPLES, 3 * settings.Np + warm_up), _SAMPLES_MAX)
-    measure, on_the_way = _measured(machine), deque([0.0] * settings.n_late)
+    measure, on_the_way = _linear_drive(machine), deque([0.0] * settings.n_late)
     rows = Rows()
     for x_d in _command(machine, n):
         outputs = [float(getattr(look_ahead, name)) for name in names]
@@ -112,25 +113,6 @@ def _look_ahead_rows(spec: FmuSpec) -> Rows:
         rows.append((outputs, [x_d, on_the_way.popleft()]))
         look_ahead.sample(*rows[-1][1])
     return rows
-
-
-def _drive(machine: Machine) -> tuple[Any, Encoder]:
-    assert machine.plant is not None  # by fmu_names
-    return machine.new_plant(), Encoder(machine.plant.noise_std, machine.plant.seed)
-
-
-def _measured(machine: Machine) -> Callable[[float], float]:
-    """Return a function of ``x_d(k)`` that gives the measured ``x(k)`` of the plant, or of a linear drive."""
-    if machine.plant is None:
-        return _linear_drive(machine)
-    plant, encoder = _drive(machine)
-
-    def measure(x_d: float) -> float:
-        x_meas = encoder.measure(plant.x)
-        plant.step(x_d, machine.T_s)
-        return x_meas
-
-    return measure
 
 
 def _linear_drive(machine: Machine) -> Callable[[float], float]:

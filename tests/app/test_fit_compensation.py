@@ -18,11 +18,11 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import CompensatorSettings
 from hybridsep.base.signals import Array
-from hybridsep.compensate.expected import Expected
 from hybridsep.cosim.fmu import read_description
 from hybridsep.cosim.inverse import FirInverse, PlayedCommand
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.fitting.compensation import FACTORS, Stretch, binding_words, drive_limits, expected_tracking
+from hybridsep.fitting.expected import Expected, Trial
 from hybridsep.fitting.replay import Recording
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.identify.model import machine_of
@@ -207,4 +207,4 @@ def test_what_is_advised_gains_something(
             size = sizes.get(changed[0][0], {}).get(changed[0][1], 1.0) if len(changed) == 1 else 1.0
             return Expected(x_d, np.resize(size, Np), x_d, x_d)
 
-    assert list(Drawn(axis(limits), x_d, x_d - off, slice(None)).limit_costs().advised) == advised
+    assert list(Drawn(Trial(axis(limits)), x_d, x_d - off, slice(None)).limit_costs().advised) == advised

@@ -12,6 +12,7 @@ from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.fitting.compensation import Ahead, LookAheads, Stretch
+from hybridsep.fitting.expected import Trial
 from hybridsep.fitting.replay import Recording
 from hybridsep.identify.model import machine_of
 from hybridsep.logs.units import shown_in
@@ -35,7 +36,7 @@ def axis(model: ModalModel, preview: int) -> Machine:
 
 
 def looked(machine: Machine, recording: Recording) -> LookAheads:
-    stretch = Stretch.of(machine, [recording])
+    stretch = Stretch.of(Trial(machine), [recording])
     assert stretch is not None
     return stretch.look_aheads()
 
@@ -128,7 +129,7 @@ def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
 )
 def test_a_stretch_that_is_cut_out_of_motion_is_led_in_and_out_at_rest(x_d: Array, most: float) -> None:
     """A command that never rests: the largest error was that of its step to rest, where the stretch ends."""
-    stretch = Stretch.of(axis(SERVO, SERVO.look_ahead(T_S)), [Recording(x_d, x_d, 3000)])
+    stretch = Stretch.of(Trial(axis(SERVO, SERVO.look_ahead(T_S))), [Recording(x_d, x_d, 3000)])
     assert stretch is not None
     speed = np.abs(np.diff(stretch.x_d)) / T_S
     assert max(speed[0], speed[-1]) < 1e-3 * speed.max()
@@ -139,5 +140,5 @@ def test_a_stretch_that_is_cut_out_of_motion_is_led_in_and_out_at_rest(x_d: Arra
 
 def test_nothing_is_said_without_motion_or_of_an_error_that_the_model_does_not_know() -> None:
     fast = ModalModel([Mode(400.0, 0.7, (800 * np.pi) ** 2)])
-    assert Stretch.of(axis(fast, 100), [Recording(MOVES, MOVES + 0.01 * np.sign(MOVES), 500)]) is None
-    assert Stretch.of(axis(SERVO, 100), [Recording(np.zeros(900), np.zeros(900), 500)]) is None
+    assert Stretch.of(Trial(axis(fast, 100)), [Recording(MOVES, MOVES + 0.01 * np.sign(MOVES), 500)]) is None
+    assert Stretch.of(Trial(axis(SERVO, 100)), [Recording(np.zeros(900), np.zeros(900), 500)]) is None
