@@ -18,6 +18,8 @@ A is ``arx_command``, linear and time-invariant: its features are increments and
 ``arx_residual`` and ``static``; ``fresh_start`` counts as the expert whose counterpart it is.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -136,6 +138,11 @@ class PlanModel:
         fastest = min(np.abs(np.diff(signal)).max() for signal in (window.x_d, window.x_pb))
         return not fastest <= factor * self._model.learned.fastest
 
+    def speed(self, change: Array) -> float:
+        """Return the velocity, RMS, of a change of the commands, ``(n,)``, m, relative to the scale; 0 without one."""
+        moved, scale = np.diff(change, prepend=0.0), self.scales.velocity * self._discrete.T_s
+        return math.sqrt(float(moved @ moved) / len(moved)) / scale if scale > 0.0 else 0.0
+
     def predict(self, x_d: Array) -> AveragedForecast:
         """Predict the plan, and what is late before it, under commands ``x_d``, ``(n,)``, m."""
         return self._model.forecast_by(self._solved, self._window(x_d), self.scales, self.of_previous_plan)
@@ -245,20 +252,22 @@ the bounds: from that of ``EXACT`` a plan within limits that its command just ke
 window.
 """
 
-_REACHES = (0.1, 0.01, 0.0)
-"""Reach of friction's slope in each Newton step, relative to the model's velocity scale: a tangent is blind to a sign
-that changes nearby. One step alone has the second one."""
+_FIRST_REACH, _REACH = 0.1, 0.5
+"""Half of the change of velocity that friction's slope is taken over: relative to the model's velocity scale, in the
+first Newton step of a plan; in a further one relative to what the step before has changed of the velocity, or would
+have (RMS). A slope over less is blind to a sign that changes nearby, and no way down; one over more sees signs that
+stay."""
 
-_STEP = 5
-"""Samples that a plan has for each Newton step: two steps in windows of 20. One step leaves as much on drives of modes
-and of two masses, and five times the error, from pass to pass, at the reversals of a drive whose friction is most of
-it. In windows of 50 two steps leave twice the error of three on the stage's Y axis, warm."""
+_STEP, _STEPS_MAX = 5, 3
+"""Samples that a plan has for each Newton step, and most steps: two in windows of 20. One leaves as much on drives of
+modes and of two masses, and five times the error, from pass to pass, at the reversals of a drive whose friction is most
+of it. In windows of 50 two steps leave twice the error of three on the stage's Y axis, warm."""
 
 _FIRST_STEPS = 4  # of the solver, for the first of several Newton steps: the next one goes on from where it ends
 
 PHYSICS_STEPS = 3  # of the solver, for the physics model's plan that Newton steps are compared with
 
-_LENGTHS = (1.0, 0.3)  # lengths of a step that are tried, relative to the way to the minimum
+_LENGTHS = (1.0, 0.3)  # lengths of the last step that are tried, relative to the way to the minimum; before it one
 
 _LEAST_GAIN = 1e-9
 """Relative gain below which a plan is no better than another: costs that rounding tells apart are equal."""
@@ -317,18 +326,20 @@ class AveragedPlanner:
     def plan(
         self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_followed: int, passed: Array
     ) -> PlannedPoint:
-        """Return the plan behind Newton steps, as long as they lower the cost.
+        """Return the plan behind Newton steps, each from the best one so far.
 
         ``bounds``: on its coefficients; ``n_followed``: leading samples that it leaves as they are; ``passed``:
         (preview, n_free): free splines filtered by ``G_pb``; other parameters as of :meth:`step`.
         """
-        n = max(1, n_followed // _STEP)
+        n, reach = min(max(1, n_followed // _STEP), _STEPS_MAX), _FIRST_REACH
         bounds, passed = bounds.of_change(previous_plan[N_DECIDED:], self._splines), passed @ self._splines
-        for i, reach in enumerate(_REACHES[1:2] if n == 1 else _REACHES[:n]):
-            tolerance = TOLERANCE._replace(steps=_FIRST_STEPS) if i == 0 and n > 1 else TOLERANCE
-            before, start = start, self.step(start, previous_plan, bounds, passed, reach, tolerance)
-            if start is before:
+        for i in range(n):
+            is_last = i == n - 1
+            tolerance = TOLERANCE if is_last or i > 0 else TOLERANCE._replace(steps=_FIRST_STEPS)
+            end, tried = self.step(start, previous_plan, bounds, passed, reach, tolerance, _LENGTHS[: 1 + is_last])
+            if tried is None:
                 break
+            reach, start = _REACH * self._model.speed(self._values @ (tried - start.change)), end
         return start
 
     def step(
@@ -339,13 +350,15 @@ class AveragedPlanner:
         passed: Array,
         reach: float,
         tolerance: Tolerance = TOLERANCE,
-    ) -> PlannedPoint:
-        """Return the plan behind a Newton step; the start itself, if none is better.
+        lengths: Sequence[float] = _LENGTHS,
+    ) -> tuple[PlannedPoint, Array | None]:
+        """Return the plan behind a Newton step, the start itself if none is better, and the change that was tried.
 
         ``start``: where the model is linearised; ``previous_plan``: (3 + n_free,), m: coefficients of the remainder
         of the last plan, the decided ones first; ``bounds``: on its change; ``passed``: (preview, m): the splines that
         are solved for, filtered by ``G_pb``; ``reach``: of friction's slope, as of :meth:`PlanModel.slope`;
-        ``tolerance``: of the solver.
+        ``tolerance``: of the solver; ``lengths``: that are tried, relative to the way to the minimum. The change,
+        (m,), m, is of the remainder, the end's if that is better; None if the solver finds none.
         """
         slope = self._model.slope(start.prediction, self._values, passed, reach)
         W, at, third = self._basis.weight[:, None] * slope, start.change, self._third
@@ -354,11 +367,11 @@ class AveragedPlanner:
         v = W.T @ target - self._jerk_weight * (third.T @ (start.third - third @ at))
         found = solve(PlanCost(P, v).regular(), bounds, self._unchanged, 0, tolerance=tolerance)
         if found is None:
-            return start
+            return start, None
         decided, last = np.split(previous_plan, [N_DECIDED])
-        for length in _LENGTHS:
+        for length in lengths:
             change = at + length * (found.x - at)
             end = self.point(np.concatenate((decided, last + self._splines @ change)), change)
             if is_better(end.cost, start.cost):
-                return end
-        return start
+                return end, change
+        return start, found.x

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.signals import Array
 from .output_error import Delay, Fit, Segment, fit_structure
-from .structure import DECAY_MIN, SLOWEST, Structure
+from .structure import RATES_MIN, SLOWEST, Structure
 from .uncertainty import estimates
 
 _CONTRADICTED = 4.0  # ratio of likelihoods, twice its logarithm, that contradicts: two standard deviations
@@ -17,7 +17,7 @@ _DEAD_TIME_MAX = 0.25  # longest dead time that is tried, s, and at most a quart
 def fit_delay(segments: Sequence[Segment], T_s: float, structure: Structure, known: Mapping[Structure, Fit]) -> Fit:
     """Return the fit of a structure over poles and dead time; ``known`` fits of simpler ones give the starts."""
     n = max(segment.stop for segment in segments)
-    limit, slowest = int(2 * min(_DEAD_TIME_MAX / T_s, n / 4)), DECAY_MIN / (T_s * n)
+    limit, slowest = int(2 * min(_DEAD_TIME_MAX / T_s, n / 4)), RATES_MIN / (T_s * n)
     cache: dict[int, Fit] = {}
     rate = _bandwidth(segments, T_s, known)
     starts = _starts(structure, known, T_s, rate)

@@ -9,7 +9,7 @@ from ..base.signals import Array, Indices
 from ..model.physics import Mode
 from .output_error import Fit, Segment, fit_structure, motion_split, simulated
 from .search import fit_delay, shorter_delays
-from .structure import DECAY_MIN, STRUCTURES, Structure
+from .structure import RATES_MIN, STRUCTURES, Structure
 from .uncertainty import estimates
 
 _APART = 2.5
@@ -267,7 +267,7 @@ def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:
         return ""
     if fit.at_bound:
         return "a parameter at the end of its range"
-    if structure.decay(fit.theta) < DECAY_MIN / (T_s * max(segment.stop for segment in segments)):
+    if structure.slowest_rate(fit.theta) < RATES_MIN / (T_s * max(segment.stop for segment in segments)):
         return "a pole slower than the recording shows"
     if structure.order > 2:
         fitted = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in segments if s.known[: s.stop].sum() > 1]

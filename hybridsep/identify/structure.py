@@ -24,7 +24,7 @@ not resolve a mode, and its replay is refused."""
 
 _UNDERFLOW = 700.0  # time constants in which numbers fall to the least that are normal
 
-DECAY_MIN = 5.0  # time constants of a pole within the recording, at least; a slower one cannot be told from drift
+RATES_MIN = 5.0  # time constants, or periods, of a pole within the recording, at least: slower ones look like drift
 
 
 @dataclass(frozen=True)
@@ -83,10 +83,14 @@ class Structure:
         high = mode_high * self.n_modes + [10.0 / T_s] * self.lag
         return np.log(low), np.log(high)
 
-    def decay(self, theta: Array) -> float:
-        """Return the slowest decay rate of its poles, 1/s; infinite without poles."""
+    def slowest_rate(self, theta: Array) -> float:
+        """Return the rate of its slowest pole, 1/s, of one that swings at least its frequency; infinite without poles.
+
+        A swing shows in a few periods, however slowly it decays.
+        """
         omegas, zetas = np.exp(theta[: 2 * self.n_modes : 2]), np.exp(theta[1 : 2 * self.n_modes : 2])
-        rates = omegas * np.where(zetas > 1, zetas - np.sqrt(np.maximum(zetas**2 - 1, 0.0)), zetas)
+        decays = omegas * np.where(zetas > 1, zetas - np.sqrt(np.maximum(zetas**2 - 1, 0.0)), zetas)
+        rates = np.where(zetas > 1, decays, np.maximum(decays, omegas / (2.0 * np.pi)))
         return float(min([*rates, *np.exp(theta[2 * self.n_modes :])], default=np.inf))
 
     def modes(self, theta: Array, linear: Array, T_s: float) -> list[Mode]:

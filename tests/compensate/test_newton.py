@@ -214,7 +214,8 @@ def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.Mo
     worse = np.full(3 + sep._basis.n_free, 1e-3)
     for cost in (math.inf, math.nan):
         monkeypatch.setattr(
-            AveragedPlanner, "step", lambda _, start, *__, cost=cost: replace(start, coefficients=worse, cost=cost)
+            *(AveragedPlanner, "step"),
+            lambda _, start, *__, cost=cost: (replace(start, coefficients=worse, cost=cost), start.change),
         )
         plan = sep.plan(x_d)
         assert plan.state is SepState.PHYSICS

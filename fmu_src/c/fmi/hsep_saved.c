@@ -12,7 +12,7 @@
 
 #include <string.h>
 
-#define SAVED_VERSION 39U /* changes whenever the layout of any state does */
+#define SAVED_VERSION 40U /* changes whenever the layout of any state does */
 #define SAVED_BYTE_ORDER 0x01020304U
 #define SAVED_MAGIC "HSEPFMI2"
 

@@ -6,11 +6,9 @@
 
 #include <string.h>
 
-static const hsep_real averaged_planner_reaches[] = {HSEP_NEWTON_REACHES};
 static const hsep_real averaged_planner_lengths[] = {HSEP_NEWTON_LENGTHS};
 static const hsep_tolerance averaged_planner_tolerance = {HSEP_NEWTON_TOLERANCE};
 
-HSEP_ASSERT(reaches, sizeof averaged_planner_reaches == HSEP_AVERAGED_STEPS * sizeof(hsep_real));
 HSEP_ASSERT(lengths, sizeof averaged_planner_lengths == HSEP_AVERAGED_TRIES * sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_averaged_planner_lay_out(
@@ -29,7 +27,7 @@ HSEP_API hsep_real hsep_averaged_planner_lay_out(
     self->n = n;
     self->m = m;
     const hsep_int fit = n_pinned * planner->spacing / HSEP_NEWTON_STEP;
-    self->n_steps = fit < 1 ? 1 : fit < HSEP_AVERAGED_STEPS ? fit : HSEP_AVERAGED_STEPS;
+    self->n_steps = fit < 1 ? 1 : fit < HSEP_NEWTON_STEPS_MAX ? fit : HSEP_NEWTON_STEPS_MAX;
     self->rest = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
     self->of_physics = hsep_take(&end, coefficients);
@@ -305,6 +303,32 @@ static void averaged_planner_solve(hsep_averaged_planner *self, const hsep_avera
                                                          : HSEP_PLAN_BOUNDED;
 }
 
+/* Lengths of a Newton step that are tried: one, of the last step all. */
+static hsep_int averaged_planner_tries(const hsep_averaged_planner *self)
+{
+    return self->steps + 1 < self->n_steps ? 1 : HSEP_AVERAGED_TRIES;
+}
+
+/* Half of the change of velocity that the slope of the next Newton step is taken over: a share of what coefficients
+ * change the best plan's, RMS, relative to the model's scale. */
+static hsep_real averaged_planner_next_reach(
+    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
+{
+    const hsep_real *best = hsep_at(self, self->best);
+    const hsep_real scale = task->model->forecast_scale * hsep_averaged_disturbances(task->model)->T_s;
+    const hsep_int n = HSEP_N_DECIDED + self->n;
+    hsep_real *change = hsep_at(self, self->target), last = 0.0, squares = 0.0;
+    for (hsep_int i = 0; i < n; i++) {
+        change[i] = c[i] - best[i];
+    }
+    for (hsep_int k = 0; k < self->preview; k++) {
+        const hsep_real delta = hsep_splines_sum(hsep_planner_splines(task->planner), change, n, k);
+        squares += (delta - last) * (delta - last);
+        last = delta;
+    }
+    return scale > 0.0 ? HSEP_NEWTON_REACH * hsep_sqrt(squares / (hsep_real)self->preview) / scale : 0.0;
+}
+
 /* Judge a length of a step, whose end the planner has, and take it if it is better; otherwise a shorter one is tried.
  */
 static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_averaged_task *task)
@@ -312,6 +336,9 @@ static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_avera
     hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
     hsep_real *change = hsep_at(self, self->change), *found = hsep_at(self, self->found);
     const hsep_real cost = averaged_planner_cost(self, task, c);
+    if (self->steps + 1 < self->n_steps) {
+        self->reach = averaged_planner_next_reach(self, task, c);
+    }
     self->tries++;
     if (averaged_planner_better(cost, self->cost)) {
         self->gains = 1;
@@ -319,7 +346,7 @@ static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_avera
         self->cost = cost;
         averaged_planner_copy(self, best, c);
         memcpy(change, found, (size_t)self->m * sizeof(hsep_real));
-    } else if (self->tries < HSEP_AVERAGED_TRIES) {
+    } else if (self->tries < averaged_planner_tries(self)) {
         const hsep_real shorter = averaged_planner_lengths[self->tries] / averaged_planner_lengths[self->tries - 1];
         for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
             c[j] = best[j] + shorter * (c[j] - best[j]);
@@ -608,22 +635,27 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
             self->cost_of_rest = averaged_planner_cost(self, task, rest);
         }
 
-        /* Newton steps from the remainder of the last plan, as long as they lower the cost */
+        /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
         if (self->follows) {
             averaged_planner_copy(self, hsep_at(self, self->best), rest);
             memset(hsep_at(self, self->change), 0, (size_t)self->m * sizeof(hsep_real));
             hsep_planner_may_turn(planner); /* the model follows the friction */
             planner->change = self->bound;
         }
-        self->gains = self->follows;
-        for (self->steps = 0; self->gains && self->steps < self->n_steps; self->steps++) {
+        self->gains = 1;
+        self->reach = HSEP_NEWTON_FIRST_REACH;
+        for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
+            if (!self->gains) { /* what was predicted last was no better */
+                self->samples = 0;
+                AVERAGED_PLANNER_PREDICT(15, all, hsep_at(self, self->best), 0)
+            }
             self->gains = 0;
             averaged_planner_copy(self, c, rest);
             AVERAGED_PLANNER_YIELD(7, work.linearise);
             (void)averaged_planner_errors(self, task); /* of the best plan so far, to which W c is added */
             hsep_linearised_at(
                 hsep_part(self, self->linearised), task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb),
-                averaged_planner_reaches[self->n_steps == 1 ? 1 : self->steps]); /* one alone has the second one */
+                self->reach);
             for (self->spline = 0; self->spline < self->m;) {
                 AVERAGED_PLANNER_YIELD(8, averaged_planner_of_columns(self, planner, &work, self->spline));
                 averaged_planner_columns(self, task);
@@ -639,7 +671,7 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
                 break;
             }
             memcpy(hsep_at(self, self->found), hsep_planner_problem(planner).x, (size_t)self->m * sizeof(hsep_real));
-            for (self->tries = 0; self->tries < HSEP_AVERAGED_TRIES;) {
+            for (self->tries = 0; self->tries < averaged_planner_tries(self);) {
                 self->samples = 0;
                 AVERAGED_PLANNER_PREDICT(11, all, c, 0)
                 averaged_planner_judge(self, task);

@@ -1,8 +1,8 @@
 /* Planner on the residual model with averaging, by Newton steps that follow the slope of its disturbances.
  *
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
- * delta. Each of at most three Gauss-Newton steps solves the quadratic programme of the linearised model, and goes
- * towards its minimum as far as lowers the cost. Once it has learned, the averaged model judges all plans: its own, the
+ * delta. Each of at most three Gauss-Newton steps solves the quadratic programme of the model linearised at the best plan
+ * so far, over what the step before changed, and goes to its minimum if that lowers the cost. Once it has learned, the averaged model judges all plans: its own, the
  * physics model's, and the remainder of the last one; the best is taken, of its own change of the last one a share.
  * Where its own asks for a larger change than compensation is made for, it is wrong, and plans none for a time, which
  * doubles; a plan that ends compensation stands for the remainder then, and is followed where compensation is off.
@@ -21,8 +21,7 @@
 #include "hsep_predictor.h"
 #include "hsep_averaged_model.h"
 
-#define HSEP_AVERAGED_STEPS 3    /* Newton steps of a plan at most, */
-#define HSEP_AVERAGED_TRIES 2    /* lengths of a Newton step that are tried, */
+#define HSEP_AVERAGED_TRIES 2    /* lengths of the last Newton step that are tried, */
 #define HSEP_AVERAGED_VARIED 4   /* variances that are computed in a part, */
 #define HSEP_AVERAGED_PRODUCTS 8 /* rows of a programme that are */
 #define HSEP_AVERAGED_SHAPES 28  /* spacings of splines with knots 1, 2 and 4 of them apart: 4 each time */
@@ -41,6 +40,7 @@ typedef struct {
     hsep_int steps;         /* those done, */
     hsep_int gains;         /* whether the last one lowered the cost, */
     hsep_int tries;         /* and lengths of it that were tried */
+    hsep_real reach;        /* of friction's slope in it, relative to the velocity scale */
     hsep_int samples;       /* samples that are predicted, */
     hsep_int spline;        /* splines whose change of x_h, or row of the programme, is computed */
     hsep_int status;        /* hsep_plan_status of the programme that is being solved */
@@ -76,7 +76,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 46);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 47);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
