@@ -61,7 +61,7 @@ class SepCompensator:
     """
 
     _SAVED = ("lead_in", "_state_before", "monitor", "_previous_plan", "_last_stop", "_delta_before", "_x_d_before")
-    _SAVED_OF_PLANNING = ("paused", "pause", "ahead", "share", "corrected")
+    _SAVED_OF_PLANNING = ("paused", "pause", "ahead", "share", "corrected", "reach")
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         Np = predictor.Np
@@ -195,9 +195,12 @@ class SepCompensator:
         prediction = predictor.predict(x_dm + loads[:Np], path=path, scales=chosen.scales)
         now = command[:Np].copy()
         share, correction = self._planning.share, np.zeros_like(coefficients)
+        reach = self._planning.reach if chosen.reach is None else chosen.reach
         if chosen.share is not None:
             share, correction = chosen.share, chosen.coefficients - self._previous_plan
-        self._pending = PendingPlan(coefficients, delta, now, stop, chosen.state, chosen.runs_away, share, correction)
+        self._pending = PendingPlan(
+            *(coefficients, delta, now, stop, chosen.state, chosen.runs_away, share, correction, reach)
+        )
         as_published(prediction.x_pb, "x_pb")
         x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state, compensate)
         return PublishedWindow(
@@ -268,7 +271,7 @@ class SepCompensator:
             compensator.predictor = kept  # the constructor has restarted the other one
             nothing = np.zeros(compensator.predictor.Np)
             plan, stop = compensator._previous_plan, compensator._last_stop
-            pending = PendingPlan(plan, nothing, nothing, stop, SepState.OFF, False, 1.0, plan)
+            pending = PendingPlan(plan, nothing, nothing, stop, SepState.OFF, False, 1.0, plan, 0.0)
             like = compensator._saved(), pending if meta["is_planned"] else ()
             saved, found = restored(like, arrays)
             for (owner, name), value in zip(compensator._owners(), saved, strict=True):

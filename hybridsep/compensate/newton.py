@@ -2,12 +2,12 @@
 
 ``min ‖w (x_d − x_h(x_d + δ))‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where the weights ``w`` of the errors
 fall to the end of a plan (``splines.py``), and where ``x_h`` is not affine in ``δ``:
-friction that follows the command changes its sign with the command's velocity. One to three Gauss-Newton steps begin
-at the remainder of the last plan: each solves the quadratic programme of the model linearised where the last one ended,
-and goes to its minimum, or less far if only that lowers the cost; the next window goes on from there. The first samples
-of a plan follow the last plan, and the plan is made while they act; the steps of the solver are limited, so that the
-work fits into these samples. Predictions are shrunk by their variance, so where the model knows nothing the plan is the
-physics model's.
+friction that follows the command changes its sign with the command's velocity. One or two Gauss-Newton steps begin at
+the remainder of the last plan: each solves the quadratic programme of the model linearised where the last one ended,
+friction over as large a change of velocity as the last step made, and goes to its minimum, or less far if only that
+lowers the cost; the next window goes on from there. The first samples of a plan follow the last plan, and the plan is
+made while they act; the steps of the solver are limited, so that the work fits into these samples. Predictions are
+shrunk by their variance, so where the model knows nothing the plan is the physics model's.
 
 The slope at given commands is ``sech²(v/v_i)`` for friction and ``2|x|`` for stiffness. The weights of the experts and
 of the stack, and the shrinking by the variance, are held constant:
@@ -19,7 +19,6 @@ A is ``arx_command``, linear and time-invariant: its features are increments and
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -252,22 +251,18 @@ the bounds: from that of ``EXACT`` a plan within limits that its command just ke
 window.
 """
 
-_FIRST_REACH, _REACH = 0.1, 0.5
+FIRST_REACH, _REACH = 0.1, 0.5
 """Half of the change of velocity that friction's slope is taken over: relative to the model's velocity scale, in the
-first Newton step of a plan; in a further one relative to what the step before has changed of the velocity, or would
-have (RMS). A slope over less is blind to a sign that changes nearby, and no way down; one over more sees signs that
-stay."""
+first step of a run; after it relative to what the last step has changed of the velocity, or would have (RMS). A slope
+over less is blind to a sign that changes nearby, and no way down; one over more sees signs that stay."""
 
-_STEP, _STEPS_MAX = 5, 3
-"""Samples that a plan has for each Newton step, and most steps: two in windows of 20. One leaves as much on drives of
-modes and of two masses, and five times the error, from pass to pass, at the reversals of a drive whose friction is most
-of it. In windows of 50 two steps leave twice the error of three on the stage's Y axis, warm."""
-
-_FIRST_STEPS = 4  # of the solver, for the first of several Newton steps: the next one goes on from where it ends
+TWICE = 15
+"""Samples that a plan has from which on it makes two Newton steps: in windows of 50, a quarter of the preview, one
+leaves fifteen times the error of two, as of three, on the stage's X axis, warm; in windows of 20 as much as two."""
 
 PHYSICS_STEPS = 3  # of the solver, for the physics model's plan that Newton steps are compared with
 
-_LENGTHS = (1.0, 0.3)  # lengths of the last step that are tried, relative to the way to the minimum; before it one
+_LENGTHS = (1.0, 0.3)  # lengths of a step that are tried, relative to the way to the minimum
 
 _LEAST_GAIN = 1e-9
 """Relative gain below which a plan is no better than another: costs that rounding tells apart are equal."""
@@ -283,7 +278,6 @@ class PlannedPoint:
     """Plan with what the model predicts under it."""
 
     coefficients: Array  # (3 + n_free,), m
-    change: Array  # (m,), m: of the remainder of the last plan, by the splines that are solved for; 0 of any other plan
     prediction: AveragedForecast
     x_h: Array  # (preview,), m, relative to the start
     third: Array  # (preview,), m, third differences of δ
@@ -308,70 +302,37 @@ class AveragedPlanner:
         delta_before: Array,
     ) -> None:
         self._basis, self._splines, self._jerk_weight, self._model = basis, splines, jerk_weight, model
-        self._x_d, self._unchanged = x_d, np.zeros(splines.shape[1])
+        self._x_d = x_d
         self._values, self._third = (one[:, N_DECIDED:] @ splines for one in (basis.values, basis.third))
         self._third_before = np.diff(np.concatenate((delta_before, np.zeros(basis.preview))), 3)
 
-    def point(
-        self, coefficients: Array, change: Array | None = None, prediction: AveragedForecast | None = None
-    ) -> PlannedPoint:
+    def point(self, coefficients: Array, prediction: AveragedForecast | None = None) -> PlannedPoint:
         """Return a plan, whose prediction may be known, with its cost, which is not finite if that overflows."""
         at = prediction or self._model.predict(self._x_d + self._basis.values @ coefficients)
         third = self._basis.third @ coefficients + self._third_before
         x_h = self._model.position(at)
         error = self._basis.weight * (self._x_d - x_h)
         cost = float(error @ error) + self._jerk_weight * float(third @ third)
-        return PlannedPoint(coefficients, self._unchanged if change is None else change, at, x_h, third, cost)
+        return PlannedPoint(coefficients, at, x_h, third, cost)
 
-    def plan(
-        self, start: PlannedPoint, previous_plan: Array, bounds: Bounds, n_followed: int, passed: Array
-    ) -> PlannedPoint:
-        """Return the plan behind Newton steps, each from the best one so far.
+    def step(self, start: PlannedPoint, bounds: Bounds, passed: Array, reach: float) -> tuple[PlannedPoint, float]:
+        """Return the plan behind a Newton step, the start itself if none is better, and the reach of the next step.
 
-        ``bounds``: on its coefficients; ``n_followed``: leading samples that it leaves as they are; ``passed``:
-        (preview, n_free): free splines filtered by ``G_pb``; other parameters as of :meth:`step`.
+        ``start``: where the model is linearised; ``bounds``: on coefficients; ``passed``: (preview, n_free): free
+        splines filtered by ``G_pb``; ``reach``: of friction's slope, as of :meth:`PlanModel.slope`.
         """
-        n, reach = min(max(1, n_followed // _STEP), _STEPS_MAX), _FIRST_REACH
-        bounds, passed = bounds.of_change(previous_plan[N_DECIDED:], self._splines), passed @ self._splines
-        for i in range(n):
-            is_last = i == n - 1
-            tolerance = TOLERANCE if is_last or i > 0 else TOLERANCE._replace(steps=_FIRST_STEPS)
-            end, tried = self.step(start, previous_plan, bounds, passed, reach, tolerance, _LENGTHS[: 1 + is_last])
-            if tried is None:
-                break
-            reach, start = _REACH * self._model.speed(self._values @ (tried - start.change)), end
-        return start
-
-    def step(
-        self,
-        start: PlannedPoint,
-        previous_plan: Array,
-        bounds: Bounds,
-        passed: Array,
-        reach: float,
-        tolerance: Tolerance = TOLERANCE,
-        lengths: Sequence[float] = _LENGTHS,
-    ) -> tuple[PlannedPoint, Array | None]:
-        """Return the plan behind a Newton step, the start itself if none is better, and the change that was tried.
-
-        ``start``: where the model is linearised; ``previous_plan``: (3 + n_free,), m: coefficients of the remainder
-        of the last plan, the decided ones first; ``bounds``: on its change; ``passed``: (preview, m): the splines that
-        are solved for, filtered by ``G_pb``; ``reach``: of friction's slope, as of :meth:`PlanModel.slope`;
-        ``tolerance``: of the solver; ``lengths``: that are tried, relative to the way to the minimum. The change,
-        (m,), m, is of the remainder, the end's if that is better; None if the solver finds none.
-        """
+        bounds, passed = bounds.of_change(start.coefficients[N_DECIDED:], self._splines), passed @ self._splines
         slope = self._model.slope(start.prediction, self._values, passed, reach)
-        W, at, third = self._basis.weight[:, None] * slope, start.change, self._third
+        W, third = self._basis.weight[:, None] * slope, self._third
         P = W.T @ W + self._jerk_weight * (third.T @ third)
-        target = self._basis.weight * (self._x_d - start.x_h) + W @ at
-        v = W.T @ target - self._jerk_weight * (third.T @ (start.third - third @ at))
-        found = solve(PlanCost(P, v).regular(), bounds, self._unchanged, 0, tolerance=tolerance)
+        v = W.T @ (self._basis.weight * (self._x_d - start.x_h)) - self._jerk_weight * (third.T @ start.third)
+        found = solve(PlanCost(P, v).regular(), bounds, np.zeros(len(v)), 0, tolerance=TOLERANCE)
         if found is None:
-            return start, None
-        decided, last = np.split(previous_plan, [N_DECIDED])
-        for length in lengths:
-            change = at + length * (found.x - at)
-            end = self.point(np.concatenate((decided, last + self._splines @ change)), change)
+            return start, reach
+        reach = _REACH * self._model.speed(self._values @ found.x)
+        change = np.concatenate((np.zeros(N_DECIDED), self._splines @ found.x))
+        for length in _LENGTHS:
+            end = self.point(start.coefficients + length * change)
             if is_better(end.cost, start.cost):
-                return end, change
-        return start, found.x
+                return end, reach
+        return start, reach

@@ -11,7 +11,7 @@ variance of predictions. A motion faster than all of its run is compensated with
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -24,7 +24,7 @@ from ..predict.averaging.experts import EXPERTS
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
-from .newton import PHYSICS_STEPS, TOLERANCE, AveragedPlanner, PlanModel, is_better
+from .newton import FIRST_REACH, PHYSICS_STEPS, TOLERANCE, TWICE, AveragedPlanner, PlanModel, is_better
 from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve, solve_change
 from .splines import N_DECIDED, SplineBasis, solved_splines
 
@@ -46,6 +46,7 @@ class PendingPlan:
     runs_away: bool  # whether the residual model's plan ran away, so that it plans none for a time
     share: float  # of the residual model's change of the last plan that is taken, but for what it doubts
     correction: Array  # (3 + n_free,), m: what is taken, before a stop shortens the plan; 0 of any other plan
+    reach: float  # of friction's slope in the next Newton step
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,7 @@ class ChosenPlan(NamedTuple):
     scales: FeatureScales | None  # of the residual model's features
     runs_away: bool = False  # whether the residual model's plan ran away
     share: float | None = None  # as :class:`PendingPlan` has it, if the residual model planned
+    reach: float | None = None  # likewise, if a Newton step was made
 
 
 class PublishedPosition(NamedTuple):
@@ -107,11 +109,13 @@ class Planning(ABC):
         self.paused, self.pause = 0, max(1, int(RETRY / (self.Np * T_s) + 0.5))  # rounded as in C
         self.ahead = np.empty((0, 0, self.Np))
         self.share, self.corrected = 1.0, np.zeros(N_DECIDED + self.basis.n_free)
+        self.reach = FIRST_REACH
 
     def follow(self, plan: PendingPlan) -> None:
         """Count a window that followed its plan."""
         kept = self.Np // self.spacing
         self.share, self.corrected = plan.share, np.concatenate((plan.correction[kept:], np.zeros(kept)))
+        self.reach = plan.reach
         self.ahead = np.concatenate((self.ahead[1:], np.full_like(self.ahead[:1], np.nan)))
         if plan.runs_away:
             self.paused, self.pause = self.pause, 2 * self.pause
@@ -338,11 +342,13 @@ class AveragedPlanning(Planning):
             ends = bool(self.paused) and most is SepState.HYBRID
             known = None if ends else model.of_previous_plan
             last = planner.point(self.ending(preview) if ends else previous_plan, prediction=known)
-            of_physics, is_away = planner.point(physics), False
+            of_physics, is_away, reach = planner.point(physics), False, None
             if follows:
-                bounds = self.limits(preview, may_turn=True, change=change)
-                n_followed = self.n_pinned * self.spacing
-                hybrid = planner.plan(last, previous_plan, bounds, n_followed, self.basis.filtered(g))
+                hybrid, reach = last, self.reach
+                for _ in range(2 if self.n_pinned * self.spacing >= TWICE else 1):
+                    before = replace(preview, previous_plan=hybrid.coefficients)
+                    bounds = self.limits(before, may_turn=True, change=change)
+                    hybrid, reach = planner.step(hybrid, bounds, self.basis.filtered(g), reach)
                 if is_better(hybrid.cost, of_physics.cost):
                     values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.horizon)
                     deltas = values @ hybrid.coefficients, values @ physics
@@ -353,10 +359,10 @@ class AveragedPlanning(Planning):
                         doubt = float(self.basis.weight**2 @ last.prediction.variance[-self.horizon :])
                         left = 1.0 / (1.0 + _DOUBT * doubt / gain) if gain > 0.0 else 0.0
                         step *= share * left if left > 0.0 else 0.0  # not NaN
-                        return ChosenPlan(SepState.HYBRID, previous_plan + step, scales, share=share)
+                        return ChosenPlan(SepState.HYBRID, previous_plan + step, scales, share=share, reach=reach)
             if is_better(last.cost, of_physics.cost):
-                return ChosenPlan(SepState.OFF, last.coefficients, scales, is_away)
-        return ChosenPlan(SepState.PHYSICS, physics, scales, is_away)
+                return ChosenPlan(SepState.OFF, last.coefficients, scales, is_away, reach=reach)
+        return ChosenPlan(SepState.PHYSICS, physics, scales, is_away, reach=reach)
 
     def _share_of(self, change: Array) -> float:
         """Return which share of a change of the last plan, ``(3 + n_free,)``, m, is taken."""

@@ -215,7 +215,7 @@ def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.Mo
     for cost in (math.inf, math.nan):
         monkeypatch.setattr(
             *(AveragedPlanner, "step"),
-            lambda _, start, *__, cost=cost: (replace(start, coefficients=worse, cost=cost), start.change),
+            lambda _, start, *__, cost=cost: (replace(start, coefficients=worse, cost=cost), 0.1),
         )
         plan = sep.plan(x_d)
         assert plan.state is SepState.PHYSICS
@@ -246,7 +246,7 @@ def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_a_time_that_doubles(mo
 
     sep = SepCompensator.from_bytes(learned())
     monkeypatch.setattr(AveragedPlanning, "choose", recorded)
-    sep.change(change_max=1.5e-4)
+    sep.change(change_max=1.2e-4)
     run(sep, sensor=no_faster(0.025), t_init=0.0)
     away = [i for i, (_, plan) in enumerate(chosen) if plan.runs_away]
     pause = round(RETRY / (50 * TS))

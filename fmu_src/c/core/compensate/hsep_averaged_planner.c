@@ -26,13 +26,10 @@ HSEP_API hsep_real hsep_averaged_planner_lay_out(
     self->Np = planner->Np;
     self->n = n;
     self->m = m;
-    const hsep_int fit = n_pinned * planner->spacing / HSEP_NEWTON_STEP;
-    self->n_steps = fit < 1 ? 1 : fit < HSEP_NEWTON_STEPS_MAX ? fit : HSEP_NEWTON_STEPS_MAX;
+    self->n_steps = n_pinned * planner->spacing >= HSEP_NEWTON_TWICE ? 2 : 1;
     self->rest = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
     self->of_physics = hsep_take(&end, coefficients);
-    self->change = hsep_take(&end, (hsep_real)m);
-    self->found = hsep_take(&end, (hsep_real)m);
     self->command = hsep_take(&end, all);
     self->x_pb = hsep_take(&end, all);
     self->e_h = hsep_take(&end, all + (hsep_real)parameters->settings->p);
@@ -176,7 +173,7 @@ static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_ave
     const hsep_int spacing = hsep_planner_splines(task->planner)->spacing;
     const hsep_real *weight = hsep_at(self, self->weight);
     hsep_linearised *linearised = hsep_part(self, self->linearised);
-    hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL}, *target = hsep_at(self, self->target);
+    hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL};
     const hsep_knot knot = hsep_knots_at(&task->planner->knots, first);
     const hsep_int apart = spacing << knot.level, from = averaged_planner_begins(self)[first];
     if (first == knot.first) {
@@ -192,7 +189,6 @@ static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_ave
         for (hsep_int k = begin; k < self->preview; k++) {
             columns[c][k - begin] *= weight[k];
         }
-        hsep_axpy(target + begin, hsep_at(self, self->change)[first + c], columns[c], self->preview - begin);
     }
     self->spline += count;
 }
@@ -268,6 +264,7 @@ HSEP_API void hsep_averaged_planner_init(
     self->pause =
         (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings->T_s) + 0.5);
     self->share = 1.0;
+    self->reach = HSEP_NEWTON_FIRST_REACH;
     hsep_linearised_init(hsep_part(self, self->linearised), parameters);
     const hsep_int half = self->preview / 2, begin = self->Np > half ? self->Np : half, falling = self->preview - begin;
     hsep_real *weight = hsep_at(self, self->weight);
@@ -284,11 +281,6 @@ static hsep_int averaged_planner_physics_steps(const hsep_averaged_planner *self
     return self->follows ? HSEP_NEWTON_PHYSICS_STEPS : averaged_planner_tolerance.steps;
 }
 
-static hsep_int averaged_planner_steps(const hsep_averaged_planner *self, hsep_int step)
-{
-    return step == 0 && self->n_steps > 1 ? HSEP_NEWTON_FIRST_STEPS : averaged_planner_tolerance.steps;
-}
-
 /* Do a part of the solution of a programme in so many steps: its factor and what its bounds allow, then the solver's.
  */
 static void averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int steps)
@@ -303,18 +295,11 @@ static void averaged_planner_solve(hsep_averaged_planner *self, const hsep_avera
                                                          : HSEP_PLAN_BOUNDED;
 }
 
-/* Lengths of a Newton step that are tried: one, of the last step all. */
-static hsep_int averaged_planner_tries(const hsep_averaged_planner *self)
+/* Half of the change of velocity that the slope of the next Newton step is taken over: a share of what this one changes
+ * the best plan, or would, RMS, relative to the model's scale. */
+static hsep_real averaged_planner_next_reach(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
-    return self->steps + 1 < self->n_steps ? 1 : HSEP_AVERAGED_TRIES;
-}
-
-/* Half of the change of velocity that the slope of the next Newton step is taken over: a share of what coefficients
- * change the best plan's, RMS, relative to the model's scale. */
-static hsep_real averaged_planner_next_reach(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
-{
-    const hsep_real *best = hsep_at(self, self->best);
+    const hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
     const hsep_real scale = task->model->forecast_scale * hsep_averaged_disturbances(task->model)->T_s;
     const hsep_int n = HSEP_N_DECIDED + self->n;
     hsep_real *change = hsep_at(self, self->target), last = 0.0, squares = 0.0;
@@ -334,25 +319,17 @@ static hsep_real averaged_planner_next_reach(
 static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_averaged_task *task)
 {
     hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
-    hsep_real *change = hsep_at(self, self->change), *found = hsep_at(self, self->found);
     const hsep_real cost = averaged_planner_cost(self, task, c);
-    if (self->steps + 1 < self->n_steps) {
-        self->reach = averaged_planner_next_reach(self, task, c);
-    }
     self->tries++;
     if (averaged_planner_better(cost, self->cost)) {
         self->gains = 1;
         self->tries = HSEP_AVERAGED_TRIES;
         self->cost = cost;
         averaged_planner_copy(self, best, c);
-        memcpy(change, found, (size_t)self->m * sizeof(hsep_real));
-    } else if (self->tries < averaged_planner_tries(self)) {
+    } else if (self->tries < HSEP_AVERAGED_TRIES) {
         const hsep_real shorter = averaged_planner_lengths[self->tries] / averaged_planner_lengths[self->tries - 1];
         for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
             c[j] = best[j] + shorter * (c[j] - best[j]);
-        }
-        for (hsep_int i = 0; i < self->m; i++) {
-            found[i] = change[i] + shorter * (found[i] - change[i]);
         }
     }
 }
@@ -556,9 +533,7 @@ static hsep_real averaged_planner_left(
         for (hsep_int i = 0; i < self->m; i += averaged_planner_together(task->planner, i)) {
             newton += averaged_planner_of_columns(self, task->planner, work, i);
         }
-        for (hsep_int i = 0; i < self->n_steps; i++) {
-            left += newton + (hsep_real)averaged_planner_steps(self, i) * parts;
-        }
+        left += (hsep_real)self->n_steps * (newton + (hsep_real)averaged_planner_tolerance.steps * parts);
     }
     return left;
 }
@@ -638,21 +613,24 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
         if (self->follows) {
             averaged_planner_copy(self, hsep_at(self, self->best), rest);
-            memset(hsep_at(self, self->change), 0, (size_t)self->m * sizeof(hsep_real));
-            hsep_planner_may_turn(planner); /* the model follows the friction */
-            planner->change = self->bound;
+            averaged_planner_copy(self, c, rest);
         }
         self->gains = 1;
-        self->reach = HSEP_NEWTON_FIRST_REACH;
         for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
             if (!self->gains) { /* what was predicted last was no better */
                 self->samples = 0;
                 AVERAGED_PLANNER_PREDICT(15, all, hsep_at(self, self->best), 0)
             }
-            self->gains = 0;
-            averaged_planner_copy(self, c, rest);
+            if (self->steps > 0) {
+                AVERAGED_PLANNER_YIELD(16, work.open);
+                averaged_planner_copy(self, c, hsep_at(self, self->best));
+                hsep_planner_open(planner, task->x_d);
+                hsep_planner_change(planner);
+            }
+            hsep_planner_may_turn(planner); /* the model follows the friction */
+            planner->change = self->bound;
             AVERAGED_PLANNER_YIELD(7, work.linearise);
-            (void)averaged_planner_errors(self, task); /* of the best plan so far, to which W c is added */
+            (void)averaged_planner_errors(self, task);
             hsep_linearised_at(
                 hsep_part(self, self->linearised), task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb),
                 self->reach);
@@ -666,12 +644,14 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
                 averaged_planner_products(self, planner);
             }
             hsep_planner_complete(planner, planner->jerk_weight);
-            AVERAGED_PLANNER_SOLVE(10, averaged_planner_steps(self, self->steps))
-            if (self->status == HSEP_PLAN_FAILED) {
-                break;
+            AVERAGED_PLANNER_SOLVE(10, averaged_planner_tolerance.steps)
+            self->gains = 0;
+            self->tries = HSEP_AVERAGED_TRIES;
+            if (self->status != HSEP_PLAN_FAILED) {
+                self->reach = averaged_planner_next_reach(self, task);
+                self->tries = 0;
             }
-            memcpy(hsep_at(self, self->found), hsep_planner_problem(planner).x, (size_t)self->m * sizeof(hsep_real));
-            for (self->tries = 0; self->tries < averaged_planner_tries(self);) {
+            while (self->tries < HSEP_AVERAGED_TRIES) {
                 self->samples = 0;
                 AVERAGED_PLANNER_PREDICT(11, all, c, 0)
                 averaged_planner_judge(self, task);

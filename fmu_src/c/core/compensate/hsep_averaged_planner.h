@@ -1,7 +1,7 @@
 /* Planner on the residual model with averaging, by Newton steps that follow the slope of its disturbances.
  *
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
- * delta. Each of at most three Gauss-Newton steps solves the quadratic programme of the model linearised at the best plan
+ * delta. Each of one or two Gauss-Newton steps solves the quadratic programme of the model linearised at the best plan
  * so far, over what the step before changed, and goes to its minimum if that lowers the cost. Once it has learned, the averaged model judges all plans: its own, the
  * physics model's, and the remainder of the last one; the best is taken, of its own change of the last one a share.
  * Where its own asks for a larger change than compensation is made for, it is wrong, and plans none for a time, which
@@ -36,7 +36,7 @@ typedef struct {
     hsep_int judges;        /* whether the averaged model judges plans, */
     hsep_int follows;       /* and whether it may plan */
     hsep_int ends;          /* whether a plan that ends compensation stands for the remainder of the last one */
-    hsep_int n_steps;       /* Newton steps of a plan at most, */
+    hsep_int n_steps;       /* Newton steps of a plan, */
     hsep_int steps;         /* those done, */
     hsep_int gains;         /* whether the last one lowered the cost, */
     hsep_int tries;         /* and lengths of it that were tried */
@@ -58,8 +58,6 @@ typedef struct {
     hsep_int rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_int best;       /* (3 + n,) m, coefficients of the best plan so far */
     hsep_int of_physics; /* (3 + n,) m, coefficients of the physics model's plan */
-    hsep_int change;     /* (m,) m, what changes the remainder of the last plan to the best one, */
-    hsep_int found;      /* (m,) m, and to the one that is tried */
     hsep_int command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
     hsep_int x_pb;       /* (preview + late,) m, their prediction by the physics model, */
     hsep_int e_h;        /* (preview + late + p,) m, and what the averaged model adds; behind it the last residuals */
@@ -76,7 +74,7 @@ typedef struct {
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
 
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 47);
+HSEP_ASSERT_WORDS(hsep_averaged_planner, 45);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
