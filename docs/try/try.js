@@ -45,6 +45,12 @@ function split(line, separator) {
   return cells.map((cell) => cell.replace(new RegExp(`${separator}$`), "").trim().replace(/^["'](.*)["']$/, "$1").trim());
 }
 
+/** Whether whole numbers below 1000 have no comma in a column, and others one: no decimals come and go so. */
+function passes_1000(rows, j) {
+  const written = rows.map((row) => row[j] ?? ""), plain = written.filter((cell) => cell && !cell.includes(","));
+  return plain.length > 0 && plain.every((cell) => /^[+-]?\d{1,3}$/.test(cell)) && written.some((cell) => cell.includes(","));
+}
+
 /** Names, units and rows of texts of a CSV; what a comma in a number stands for, null where it is an error. */
 function parse(text) {
   const lines = text.replace(/^\ufeff/, "").split(/\r?\n/).filter((line) => line.trim() && !/^\s*(#|%|\/\/|!)/.test(line));
@@ -58,7 +64,7 @@ function parse(text) {
     cell && (isFinite(cell.replace(",", ".")) || THOUSANDS.test(cell)));
   const commas = written.filter((cell) => cell.includes(",")), points = written.some((cell) => cell.includes("."));
   const thousands = commas.length && commas.every((cell) => THOUSANDS.test(cell)) &&
-    (points || commas.some((cell) => cell.split(",").length > 2));
+    (points || commas.some((cell) => cell.split(",").length > 2) || cells[0].some((_, j) => passes_1000(rows, j)));
   return { names: cells[0], units: has_units ? below : [], rows, comma: thousands ? "" : points ? null : "." };
 }
 

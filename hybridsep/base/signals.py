@@ -114,7 +114,7 @@ def _as_array(values: Any, name: str, factor: Callable[[str], float] | None = No
         raise SignalError(f"{name} must be in m or rad, got {brief(given.unit)}; convert it, or read_log does")
     labels = index_values(given.index)
     if len(labels) > 1:
-        steps = np.diff(labels) / np.median(np.diff(labels))
+        steps = np.diff(labels) / np.abs(np.median(np.diff(labels)))
         if not (even := (steps > 0.0) & (steps < _GAP)).all():
             i = int(np.argmin(even))
             raise SignalError(

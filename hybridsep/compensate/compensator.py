@@ -202,7 +202,7 @@ class SepCompensator:
             *(coefficients, delta, now, stop, chosen.state, chosen.runs_away, share, correction, reach)
         )
         as_published(prediction.x_pb, "x_pb")
-        x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state, compensate)
+        x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state)
         return PublishedWindow(
             now, x_dm, prediction.x_pb, x_h, x_h_std, chosen.state, n_warm_up, n_followed, self._state_before
         )

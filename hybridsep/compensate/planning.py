@@ -132,7 +132,7 @@ class Planning(ABC):
         """Return the best available plan on a model up to ``most``."""
 
     @abstractmethod
-    def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
+    def published(self, prediction: Prediction, state: SepState) -> PublishedPosition:
         """Return what is published of a prediction, the plan being of a model ``state``.
 
         Raises SignalError if it diverges.
@@ -211,7 +211,7 @@ class PaperPlanning(Planning):
                 return ChosenPlan(state, found, None)
         return ChosenPlan(SepState.OFF, preview.previous_plan, None)
 
-    def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
+    def published(self, prediction: Prediction, state: SepState) -> PublishedPosition:
         """Return the model's position where it planned, else the physics model's."""
         x_h, Np = prediction.x_pb.copy(), len(prediction.x_pb)
         if state is SepState.HYBRID:
@@ -372,13 +372,11 @@ class AveragedPlanning(Planning):
         cosine = float(now @ before) / size if size > 0.0 else 0.0
         return min(max(self.share * (1.0 + _TAKEN_BACK * cosine), _LEAST_SHARE), 1.0)
 
-    def published(self, prediction: Prediction, state: SepState, most: SepState) -> PublishedPosition:
-        """Return the model's position wherever it may plan.
+    def published(self, prediction: Prediction, state: SepState) -> PublishedPosition:
+        """Return the model's position, whichever model planned.
 
         Its prediction needs no stability test, and which model planned the window is known only after its first samples
         have acted.
         """
-        n_followed, Np = self.n_pinned * self.spacing, len(prediction.x_pb)
-        if most is SepState.HYBRID:
-            return PublishedPosition(prediction.x_h, prediction.x_h_std, prediction.n_warm_up, n_followed)
-        return PublishedPosition(prediction.x_pb.copy(), np.zeros(Np), Np, n_followed)
+        n_followed = self.n_pinned * self.spacing
+        return PublishedPosition(prediction.x_h, prediction.x_h_std, prediction.n_warm_up, n_followed)

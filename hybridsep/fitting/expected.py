@@ -98,7 +98,9 @@ class Trial:
             residual = x[late:] - discrete.forced_response(discrete.rest(), x_d - start)[0][:n] - start
             at_rest = np.append(residual[~np.isnan(residual)], 0.0)[0]
             residual = np.pad(residual, (delay, late), constant_values=(at_rest, 0.0))
-            command, state, on_the_way = np.pad(x_d, (0, delay), mode="edge"), discrete.rest(), deque([start] * late)
+            # Behind its end the command goes on, as plans would see a stop in it that never comes
+            further = x_d[-1] + np.diff(x_d[-2:]).sum() * np.arange(1, delay + 1)
+            command, state, on_the_way = np.append(x_d, further), discrete.rest(), deque([start] * late)
             x_dm, true = np.empty((2, delay + len(x_d)))
             with ExitStack() as stack:
                 ahead: FmuController | LibraryController = LibraryController(own, 0.0 if i else None)

@@ -2,6 +2,7 @@
 
 import errno
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -326,6 +327,8 @@ def fit(
     settings_to_try(default, p)  # which refuses what does not fit into the window
     ahead = None
     if look_ahead is not None:
+        if not (isinstance(look_ahead, int | float) and 0.0 < look_ahead < math.inf):
+            raise ParameterError(f"look_ahead must be a time, s, got {look_ahead!r}")
         label = f"look_ahead = {look_ahead:g} s, in samples of {T_s:g} s,"
         ahead = PARAMETERS["preview"].checked(round(look_ahead / T_s), label)
 

@@ -156,11 +156,12 @@ def _findings(
             "independent ones, which the standard deviations take into account"
         )
     error = float(np.std(np.concatenate([(s.y - s.u)[s.known] for s in segments])))
-    if fit.structure.order and fit.rms > _LEFT * error:
+    if fit.rms > _LEFT * error:
+        why = "friction, or a disturbance that repeats with the command, moves its modes by more than their standard "
+        why += "deviations say; record faster" if fit.structure.order else "no loop is seen; record longer, or faster"
         findings.append(
             f"the loop is not identified: of a servo error of {shown.words(error)} (standard deviation) the model "
-            f"leaves {shown.words(fit.rms)}; friction, or a disturbance that repeats with the command, moves its modes "
-            "by more than their standard deviations say; record faster motion, or give the loop's gains (cascade)"
+            f"leaves {shown.words(fit.rms)}; {why} motion, or give the loop's gains (cascade)"
         )
     if fit.structure.zeta:
         findings.append(

@@ -16,6 +16,8 @@ from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, 
 _COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "pulse", "pulses")
 """Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
 
+_ROW_LABELS = ("", "index", "__index_level_0__", "Unnamed: 0")  # names that pandas and Arrow give an index in a file
+
 _GAP = 1.5  # intervals of the slower column between two samples of the faster one from which on the latter has a gap
 _SAME = 1e-6  # largest difference of two channels' times, in intervals, at which they are the same: rounding
 
@@ -46,8 +48,10 @@ def choose_columns(
     given = dict(columns or {})
     chosen, remarks = _positions(source, given, axis)
     time = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
-    if time is None and "t" not in given and time_needed:
+    if time is None and "t" not in given:
         time = _only_clock(source)
+        if time is None and not time_needed:
+            time = _row_labels(source)
     if time is not None or "t" in given or time_needed:
         chosen = {"t": time, **chosen}
     source.remarks = [*source.remarks, *remarks]
@@ -157,6 +161,16 @@ def _only_clock(source: Source) -> str | None:
     return clocks[0]
 
 
+def _row_labels(source: Source) -> str | None:
+    """Return the column that counts rows, as pandas writes its index; None without one, or where it is no number."""
+    for name in {*source.names} & {*_ROW_LABELS}:
+        with suppress(LogError):
+            (labels,) = source.read([name]).columns
+            if (np.diff(labels) > 0.0).all() and (labels % 1.0 == 0.0).all():
+                return name
+    return None
+
+
 def _check_names(source: Source) -> None:
     plain = [name.partition("#")[0] for name in source.names]
     if plain and all(is_number(name) or stamp_kind(name) for name in plain):
@@ -247,7 +261,8 @@ def channels(source: Source) -> list[_Channel]:
         roles.update((name, role) for role, name in pair.items())
     with suppress(LogError):
         x_d = next((name for name, role in roles.items() if role == "x_d"), None)
-        roles[_time_of(source, x_d or "") or _only_clock(source)] = "t"
+        known = _time_of(source, x_d or "")
+        roles[_only_clock(source) if known is None else known] = "t"
     units = {**source.assumed_units, **source.units}
     return [_Channel(name, units.get(name) or stated_unit(name)[1], roles.get(name, "")) for name in source.names]
 

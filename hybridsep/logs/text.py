@@ -41,6 +41,7 @@ _MISSING = re.compile(r"[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?
 """Spellings of a missing number: of C libraries, R, databases and Excel."""
 
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
+_BELOW_1000 = re.compile(r"[+-]?\d{1,3}")
 _NOT_THOUSANDS = re.compile(r",(?!\d{3}(?!\d))")
 
 _SECOND = 1_000_000_000  # in nanoseconds, which doubles count exactly over a day
@@ -394,10 +395,10 @@ def _with_names(
     nearest = above[has_units:][:2]  # the one with more known names counts
     header, names = max(nearest, key=lambda row: n_known(row[1]) if len(row[1]) == len(nearest[0][1]) else -1)
     units = dict(zip(names, above[0][1], strict=False)) if has_units else {}
-    written = [text for row in fields for text, kind in zip(row, kinds, strict=False) if not kind and _is_written(text)]
+    columns = [[row[i] for row in fields if _is_written(row[i])] for i in range(width) if not kinds[i]]
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
-    return _Table(names, stated, delimiter, _comma(written), header, rows[start][0], clocks)
+    return _Table(names, stated, delimiter, _comma(columns), header, rows[start][0], clocks)
 
 
 def _is_written(text: str) -> bool:
@@ -405,13 +406,21 @@ def _is_written(text: str) -> bool:
     return is_number(decimal_points(text)) or bool(_THOUSANDS.fullmatch(text))
 
 
-def _comma(numbers: Sequence[str]) -> str | None:
-    """Return what a comma in numbers as they are written stands for."""
+def _comma(columns: Sequence[Sequence[str]]) -> str | None:
+    """Return what a comma in columns of numbers as they are written stands for."""
+    numbers = [text for column in columns for text in column]
     commas = [text for text in numbers if "," in text]
     points = any("." in text for text in numbers)
-    if commas and all(map(_THOUSANDS.fullmatch, commas)) and (points or any(text.count(",") > 1 for text in commas)):
+    several = any(text.count(",") > 1 for text in commas)
+    if commas and all(map(_THOUSANDS.fullmatch, commas)) and (points or several or any(map(_passes_1000, columns))):
         return ""
     return None if points else "."
+
+
+def _passes_1000(column: Sequence[str]) -> bool:
+    """Return whether whole numbers below 1000 have no comma, and others one: no decimals come and go so."""
+    plain = [text for text in column if "," not in text]
+    return 0 < len(plain) < len(column) and all(map(_BELOW_1000.fullmatch, plain))
 
 
 def _are_row_names(cells: Sequence[str]) -> bool:

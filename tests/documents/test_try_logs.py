@@ -63,6 +63,8 @@ def logs() -> Iterator[tuple[str, str]]:
     for mark in ";\t":
         texts = "".join(f"{t / 1e3:.3f}{mark}{a:,.0f}{mark}{b:,.0f}\n" for t, a, b in zip(*thousands, strict=True))
         yield f"thousands_{ord(mark)}", f"t [s]{mark}x_d [um]{mark}x [um]\n{texts}"
+    whole = "".join(f"{k};{a:,.0f};{b:,.0f}\n" for k, (_, a, b) in enumerate(zip(*thousands, strict=True)))
+    yield "thousands_whole", f"t [ms];x_d [um];x [um]\n{whole}"
     quoted = "".join(f'{t / 1e3:.3f},"{a:,.0f}","{b:,.0f}"\n' for t, a, b in zip(*thousands, strict=True))
     yield "thousands_quoted", f"t [s],x_d [um],x [um]\n{quoted}"
     yield "points_and_commas", "t [s];x_d [mm];x [mm]\n0.000;1,5;1,5\n" + rows([T[1:], X_D[1:], X[1:]], mark=";")
@@ -73,7 +75,7 @@ def logs() -> Iterator[tuple[str, str]]:
 
 READ = {
     *(f"same_{i}" for i in range(len(HEADS))), "decimal_comma", "mixed_units", "milliseconds", "inches", "turns",
-    "modulo_deg", "modulo_rad", "modulo_rev", "thousands_59", "thousands_9", "thousands_quoted",
+    "modulo_deg", "modulo_rad", "modulo_rev", "thousands_59", "thousands_9", "thousands_quoted", "thousands_whole",
 }  # fmt: skip
 """Logs of which a refusal would be wrong; the library refuses the others too, or they have gaps, as the page says."""
 

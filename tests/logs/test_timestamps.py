@@ -162,7 +162,7 @@ def test_the_only_column_of_timestamps_is_the_time(tmp_path: Path) -> None:
     assert read_log(path).t.tolist() == [0.0, 1.0]
     assert read_log(path).remarks == ("column 'recorded' is read as the time; columns (--t) names another",)
     assert read_log(path, columns={"t": "recorded"}).remarks == ()
-    assert read_log(path, T_s=0.5).t.tolist() == [0.0, 0.5]
+    refused("T_s = 0.5 s was given, but column 'recorded' has an interval of 1 s", path, T_s=0.5)
     both = "begun,ended,x_d,x\n10:20:30,10:20:31,1,2\n10:20:31,10:20:32,3,4\n"
     refused(r"column 't' is missing, the file has 'begun', 'ended', 'x_d', 'x'; name it", write_csv(path, both))
     assert read_log(path, columns={"t": "ended"}).t.tolist() == [0.0, 1.0]

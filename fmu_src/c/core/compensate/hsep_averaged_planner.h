@@ -2,10 +2,11 @@
  *
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
  * delta. Each of one or two Gauss-Newton steps solves the quadratic programme of the model linearised at the best plan
- * so far, over what the step before changed, and goes to its minimum if that lowers the cost. Once it has learned, the averaged model judges all plans: its own, the
- * physics model's, and the remainder of the last one; the best is taken, of its own change of the last one a share.
- * Where its own asks for a larger change than compensation is made for, it is wrong, and plans none for a time, which
- * doubles; a plan that ends compensation stands for the remainder then, and is followed where compensation is off.
+ * so far, friction over what the step before changed, and goes to its minimum if that lowers the cost. Once it has
+ * learned, the averaged model judges all plans: its own, the physics model's, and the remainder of the last one; the
+ * best is taken, of its own change of the last one a share. Where its own asks for a larger change than compensation is
+ * made for, it is wrong, and plans none for a time, which doubles; a plan that ends compensation stands for the
+ * remainder then, and is followed where compensation is off.
  *
  * A plan is one function in reading order, cut by yields into short parts, each of which says what it costs;
  * hsep_averaged_planner_run does as many as a sample's equal share of the work that may be left. A block as
@@ -104,7 +105,7 @@ HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hse
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
  * Cost: of a plan at most, with n splines that are solved for and all = preview + late samples, f^2 / 2 multiply-adds
  * for each expert with f features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 3 steps
- * of the physics model's programme, and 3 Newton steps of n preview p / 3 for each expert, n^2 preview / 4, 2
+ * of the physics model's programme, and 1 or 2 Newton steps of n preview p / 3 for each expert, n^2 preview / 4, 2
  * predictions, and 5 steps of their programmes; or 5 steps of the first, and of the programme of a plan that ends
  * compensation, which has all splines that are not pinned; a second length of a Newton step, rarely tried, adds
  * a prediction to the last sample. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all (f + 60)

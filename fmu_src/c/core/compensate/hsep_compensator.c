@@ -296,9 +296,8 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
     if (self->averaged) { /* which model planned is known when the plan is made */
         const hsep_averaged_task task = compensator_task(self);
-        const int is_hybrid = self->compensate == HSEP_SEP_HYBRID;
         self->before = self->state;
-        predictor->n_physics = is_hybrid ? hsep_predictor_warm_up(predictor, 0) : predictor->Np;
+        predictor->n_physics = hsep_predictor_warm_up(predictor, 0);
         hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, self->compensate);
     }
     const int solving = self->averaged || compensator_plan(self);
@@ -370,7 +369,7 @@ HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensat
     const hsep_int i = predictor->k % predictor->Np;
     const int follows = self->averaged && i < hsep_planner_pinned(planner);
     hsep_predictor_read(predictor, &outputs->predicted);
-    if (self->averaged ? self->compensate != HSEP_SEP_HYBRID : self->state != HSEP_SEP_HYBRID) {
+    if (!self->averaged && self->state != HSEP_SEP_HYBRID) {
         outputs->predicted.x_h_std = 0.0; /* of x_pb it is not known */
     }
     outputs->x_dm = hsep_at_const(self, self->x_dm)[i];
