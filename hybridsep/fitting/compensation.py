@@ -201,6 +201,9 @@ class LookAheads:
     off: float  # RMS of the error without compensation, m
     duration: float  # of the stretch, s
     T_s: float
+    # whether the command's own jerk is above its limit, as where it is rounded: plans that go on behind a short
+    # look-ahead may run away then
+    is_rough: bool = False
 
     def figures(self, shown: DisplayUnits) -> tuple[str, list[str], list[list[str]]]:
         """Return title, head and rows of a table."""
@@ -233,7 +236,7 @@ class LookAheads:
         least = least_look_ahead(self.T_s)
         enough = (one.preview for one in self.tried if one.preview >= least and self.longer(one) is None)
         found = next(enough, self.chosen)
-        return found if 2 * found <= self.chosen else self.chosen
+        return found if 2 * found <= self.chosen and not self.is_rough else self.chosen
 
     def lines(self) -> list[str]:
         """Return the look-ahead that is advised, and why, in words; empty where the machine's is as good as any."""
@@ -466,7 +469,9 @@ class Stretch:
             found = self.expected(settings, Np)
             bound = limits_that_bind(found.x_d, found.x_dm, known.T_s, own)
             tried.append(Ahead(preview, rms(found.compensated), bound))
-        return LookAheads(tuple(tried), chosen, self.off, len(found.x_d) * known.T_s, known.T_s)
+        jerk = largest(np.diff(found.x_d, 3)) / known.T_s**3
+        is_rough = own.limits is not None and jerk > own.limits.jerk
+        return LookAheads(tuple(tried), chosen, self.off, len(found.x_d) * known.T_s, known.T_s, is_rough)
 
 
 def _expected(trial: Trial, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected:

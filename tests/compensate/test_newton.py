@@ -13,6 +13,7 @@ from predictor_cases import averaged_model
 
 from hybridsep import load_machine
 from hybridsep.base.errors import StateError
+from hybridsep.base.metrics import rms
 from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.compensate import newton
@@ -202,6 +203,8 @@ def test_plans_follow_friction_that_follows_the_command() -> None:
     assert warm.tracking_rms < 0.2 * physics.tracking_rms
     for found in (first, warm):
         assert beyond(found.x_dm, DRIVE_LIMITS) <= 1.0 + 1e-6
+    # The averaged model predicts, whichever model plans
+    assert rms((physics.x_meas - physics.x_h)[400:]) < 0.5 * rms((physics.x_meas - physics.x_pb)[400:])
 
 
 @pytest.mark.slow

@@ -41,3 +41,12 @@ def test_fmu_and_library_leave_the_same(late: int, compensate: str, monkeypatch:
         (by_library,) = trial.expected(*given)
     np.testing.assert_allclose(by_fmu, by_library, rtol=0.0, atol=1e-11)
     assert np.nanmax(np.abs(by_fmu.compensated[600:])) < 0.3 * np.nanmax(np.abs(by_fmu.without[600:]))
+
+
+def test_a_command_that_ends_in_motion_is_followed_to_its_end() -> None:
+    x_d = MOVES[:450]
+    discrete, physics = SERVO.discretise(T_S), replace(MACHINE.compensator_settings, compensate="physics")
+    x = discrete.forced_response(discrete.rest(), x_d)[0]
+    (found,) = Trial(MACHINE).expected(MACHINE.compensator_predictor, physics, [(x_d, x)])
+    assert abs(found.without[-1]) > 5e-4
+    assert np.abs(found.compensated[350:]).max() < 0.01 * abs(found.without[-1])
