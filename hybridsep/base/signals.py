@@ -50,11 +50,12 @@ def given_column(values: Any) -> Given:
         index = values.indexes.get(dims[0])
     index = None if callable(index) else index
     unit = str((getattr(values, "attrs", None) or {}).get("units", ""))
-    if isinstance(values, list | tuple) and values and (hasattr(values[0], "units") or hasattr(values[0], "unit")):
+    first = values[0] if isinstance(values, list | tuple) and values else None
+    if (hasattr(first, "units") or hasattr(first, "unit")) and not hasattr(first, "isoformat"):  # pandas' times
         raise TypeError("a list of quantities; make one quantity of it")
     for size, of in (("magnitude", "units"), ("value", "unit"), ("value", "units")):  # pint, astropy, unyt
         if hasattr(values, size) and hasattr(values, of):
-            values, unit = getattr(values, size), str(getattr(values, of))
+            values, unit = getattr(values, size), str(getattr(values, of) or "")
     plain: NDArray[Any] = np.asarray(values)
     if plain.dtype == np.object_:
         plain = _of_objects(plain)

@@ -3,7 +3,7 @@
 import errno
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import IdentificationError, ParameterError, listed
+from ..base.errors import IdentificationError, ParameterError, brief, listed
 from ..base.files import plain, write_whole
 from ..base.metrics import html_table, line_plot
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, CompensatorSettings, PredictorSettings
@@ -300,6 +300,9 @@ def fit(
         If a log is too short to be split.
     """
     checked_name(name)
+    for what, value, kind in (("p", p, Iterable), ("columns", columns, Mapping), ("cascade", cascade, Mapping)):
+        if value is not None and (not isinstance(value, kind) or isinstance(value, str)):
+            raise ParameterError(f"{what} must be a {kind.__name__.lower()}, got {brief(value)}")
     if unknown := set(cascade or ()) - Cascade.parameters().keys():
         raise ParameterError(f"cascade has {', '.join(Cascade.parameters())}, got {listed(sorted(unknown))}")
     gains = None if cascade is None else Cascade(**cascade)
