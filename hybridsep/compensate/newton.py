@@ -31,7 +31,7 @@ from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, SolvedExpert
 from ..predict.averaging.features import N_FRICTION, N_LASTING, N_STOPS, StaticFeatures, StaticState
 from ..predict.averaging.model import AveragedForecast, AveragedModel
 from ..predict.window import ResidualWindow
-from .qp import Bounds, Tolerance, solve
+from .qp import Bounds, Tolerance, solve_change
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
 _OWN_REACH = 1e-3
@@ -284,35 +284,25 @@ class PlannedPoint:
     cost: float  # m²
 
 
+@dataclass(frozen=True)
 class AveragedPlanner:
-    """Plans of one window on the averaged model.
+    """Plans of one window on the averaged model."""
 
-    ``splines``: (n_free, m): those that are solved for, as sums of the free ones
-    (:func:`~hybridsep.compensate.splines.solved_splines`); ``model``: of the plan that the window begins; ``x_d``:
-    (preview,), m: commanded positions, relative to the start; ``delta_before``: (3,), m: last three values of δ.
-    """
-
-    def __init__(
-        self,
-        basis: SplineBasis,
-        splines: Array,
-        jerk_weight: float,
-        model: PlanModel,
-        x_d: Array,
-        delta_before: Array,
-    ) -> None:
-        self._basis, self._splines, self._jerk_weight, self._model = basis, splines, jerk_weight, model
-        self._x_d = x_d
-        self._values, self._third = (one[:, N_DECIDED:] @ splines for one in (basis.values, basis.third))
-        self._third_before = np.diff(np.concatenate((delta_before, np.zeros(basis.preview))), 3)
+    basis: SplineBasis
+    splines: Array  # (n_free, m): those that are solved for, as sums of the free ones (``splines.solved_splines``)
+    jerk_weight: float
+    model: PlanModel  # of the plan that the window begins
+    x_d: Array  # (preview,), m: commanded positions, relative to the start
+    delta_before: Array  # (3,), m: last three values of δ
 
     def point(self, coefficients: Array, prediction: AveragedForecast | None = None) -> PlannedPoint:
         """Return a plan, whose prediction may be known, with its cost, which is not finite if that overflows."""
-        at = prediction or self._model.predict(self._x_d + self._basis.values @ coefficients)
-        third = self._basis.third @ coefficients + self._third_before
-        x_h = self._model.position(at)
-        error = self._basis.weight * (self._x_d - x_h)
-        cost = float(error @ error) + self._jerk_weight * float(third @ third)
+        at = prediction or self.model.predict(self.x_d + self.basis.values @ coefficients)
+        before = np.diff(np.concatenate((self.delta_before, np.zeros(self.basis.preview))), 3)
+        third = self.basis.third @ coefficients + before
+        x_h = self.model.position(at)
+        error = self.basis.weight * (self.x_d - x_h)
+        cost = float(error @ error) + self.jerk_weight * float(third @ third)
         return PlannedPoint(coefficients, at, x_h, third, cost)
 
     def step(self, start: PlannedPoint, bounds: Bounds, passed: Array, reach: float) -> tuple[PlannedPoint, float]:
@@ -321,16 +311,16 @@ class AveragedPlanner:
         ``start``: where the model is linearised; ``bounds``: on coefficients; ``passed``: (preview, n_free): free
         splines filtered by ``G_pb``; ``reach``: of friction's slope, as of :meth:`PlanModel.slope`.
         """
-        bounds, passed = bounds.of_change(start.coefficients[N_DECIDED:], self._splines), passed @ self._splines
-        slope = self._model.slope(start.prediction, self._values, passed, reach)
-        W, third = self._basis.weight[:, None] * slope, self._third
-        P = W.T @ W + self._jerk_weight * (third.T @ third)
-        v = W.T @ (self._basis.weight * (self._x_d - start.x_h)) - self._jerk_weight * (third.T @ start.third)
-        found = solve(PlanCost(P, v).regular(), bounds, np.zeros(len(v)), 0, tolerance=TOLERANCE)
+        values, third = (one[:, N_DECIDED:] @ self.splines for one in (self.basis.values, self.basis.third))
+        slope = self.model.slope(start.prediction, values, passed @ self.splines, reach)
+        W = self.basis.weight[:, None] * slope
+        P = W.T @ W + self.jerk_weight * (third.T @ third)
+        v = W.T @ (self.basis.weight * (self.x_d - start.x_h)) - self.jerk_weight * (third.T @ start.third)
+        found = solve_change(PlanCost(P, v).regular(), bounds, start.coefficients, self.splines, TOLERANCE)
         if found is None:
             return start, reach
-        reach = _REACH * self._model.speed(self._values @ found.x)
-        change = np.concatenate((np.zeros(N_DECIDED), self._splines @ found.x))
+        change = found - start.coefficients
+        reach = _REACH * self.model.speed(self.basis.values @ change)
         for length in _LENGTHS:
             end = self.point(start.coefficients + length * change)
             if is_better(end.cost, start.cost):
