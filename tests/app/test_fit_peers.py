@@ -80,9 +80,7 @@ def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_pa
     """1 kHz, its sensor renewed every 2 ms, in degrees."""
     x = 3000 * measured(0)[:1600]
     x[1::2] = x[::2]
-    rows = np.column_stack((np.arange(1600) * 1e-3, 3000 * commanded()[:1600], x))
-    log = tmp_path / "axis.csv"
-    np.savetxt(log, rows, delimiter=",", header="t,x_d [deg],x [deg]", comments="", fmt="%.12g")
+    log = write_rows(tmp_path / "axis.csv", 3000 * commanded()[:1600], x, header="t,x_d [deg],x [deg]")
     out = hybridsep.done("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     words = " ".join(out.split())
     head = "800 of 1600 samples (50 %), 1.6 s at 500 Hz (recorded at 1000 Hz)"
