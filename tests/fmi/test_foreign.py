@@ -75,17 +75,14 @@ def play(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str, st
             subprocess.run([*compiler, f"-I{FMI_HEADERS}", str(source), "-o", str(host), *libraries], check=True)
         (library,) = (folder / "binaries" / TARGETS[target].folder).iterdir()
         described = fmpy.read_model_description(str(folder))
-        references: dict[str, list[str]] = {
-            causality: [
-                str(v.valueReference) for v in described.modelVariables if v.causality == causality and v.type == "Real"
-            ]
+        inputs, outputs = (
+            [v.valueReference for v in described.modelVariables if v.causality == causality and v.type == "Real"]
             for causality in ("input", "output")
-        }
+        )
         given, signals = folder / REFERENCE_FOLDER / f"{model}_in.csv", folder / "signals.bin"
         rows = np.loadtxt(given, delimiter=",", skiprows=1)[:, 1:] if given.exists() else np.zeros((600, 1))
         rows.astype("<f8").tofile(signals)
         uri = f"file:///{absolute}{folder / 'resources'}".replace("////", "///")
-        inputs, outputs = references["input"], references["output"]
         given_to_host = [f"{absolute}{library}", described.guid, uri, "1e-3", len(inputs), *inputs, *outputs]
         printed = output_of(*runner, host, *given_to_host, f"{absolute}{signals}", timeout=900, env=wine)
         return np.array([[float.fromhex(number) for number in line.split()] for line in printed.splitlines()])

@@ -76,13 +76,8 @@ def address_sanitizer(command: Sequence[str]) -> str:
 
 def run_compiler(arguments: Sequence[str | Path], *, command: Sequence[str] = ()) -> None:
     """Compile, with the host's compiler if no other is asked for, or raise with what it said."""
-    done = subprocess.run(
-        [*(command or compiler()), *FLAGS, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=build_folder(),
-    )
+    line = [*(command or compiler()), *FLAGS, *map(str, arguments)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=build_folder())
     if done.returncode:
         raise RuntimeError(f"the C compiler failed:\n{done.stderr}")
 
