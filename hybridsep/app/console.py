@@ -50,9 +50,12 @@ def print_judged(judged: "Judged", title: str, verdict: str) -> None:
         console.print("\n  ".join((f"{OF_ITSELF}:", *said)))
 
 
-def print_rows(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table of figures, with the names of its rows first."""
-    table = Table(head[0], title=title, box=box.SIMPLE, pad_edge=False)
+def print_rows(
+    title: str, head: Sequence[str], rows: Sequence[Sequence[str]], *, whole_names: bool = False, **look: Any
+) -> None:
+    """Print a table of figures, with the names of its rows first; ``look``: as for rich's ``Table``."""
+    table = Table(title=title, box=box.SIMPLE, pad_edge=False, **look)
+    table.add_column(head[0], no_wrap=whole_names)
     for column in head[1:]:
         table.add_column(column, justify="right", no_wrap=True)
     for row in rows:

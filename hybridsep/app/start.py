@@ -38,21 +38,12 @@ def demo(
 
 def print_figures(summary: dict[str, dict[str, Any]]) -> None:
     """Print the tracking errors of the demo's compensated runs, then its prediction errors, within 80 columns."""
-    from rich import box
-    from rich.table import Table
-
     from ..demo.cases import compensation_table, prediction_table
-    from .console import console
+    from .console import console, print_rows
 
     for found in (compensation_table(summary), prediction_table(summary)):
-        narrow: dict[str, Any] = {"pad_edge": False, "collapse_padding": True, "show_edge": False}
-        table = Table("case", title=f"\n{found.title}", caption=found.note, box=box.SIMPLE, **narrow)
-        table.columns[0].no_wrap = True
-        for column in found.columns:
-            table.add_column(column, justify="right", no_wrap=True)
-        for row in found.rows:
-            table.add_row(*row)
-        console.print(table)
+        head, narrow = ("case", *found.columns), {"collapse_padding": True, "show_edge": False}
+        print_rows(f"\n{found.title}", head, found.rows, whole_names=True, caption=found.note, **narrow)
     for name, case in summary.items():
         console.print(f"{name}: {case['verdict']}")
 

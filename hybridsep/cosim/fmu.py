@@ -157,12 +157,8 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
                 there = sorted(path.name for path in (folder / "binaries").glob("*") if path.is_dir())
                 raise FmuError(f"{place} is missing, there are binaries for {listed(there, str)}")
             with _working_directory():
-                slave = version.slave(
-                    guid=self.description.guid,
-                    unzipDirectory=str(folder),
-                    modelIdentifier=identifier,
-                    instanceName=instance_name,
-                )
+                names = {"modelIdentifier": identifier, "instanceName": instance_name}
+                slave = version.slave(guid=self.description.guid, unzipDirectory=str(folder), **names)
         except Exception as error:  # fmpy raises bare Exceptions here
             if isinstance(error, OSError) and error.filename is not None:  # the disk's, with a name
                 raise

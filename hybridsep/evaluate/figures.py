@@ -45,19 +45,16 @@ _SPANS = {
 _PAD = 0.08  # room between panels, and at the edges, inches
 
 
+def _legend(place: Axes | Figure, handles: Sequence[Any], **where: Any) -> None:
+    """Give a panel or a figure a legend in one row, without a frame."""
+    place.legend(handles=handles, ncols=max(len(handles), 1), columnspacing=1.4, frameon=False, **where)
+
+
 def _legend_above(axes: Axes, handles: Sequence[Any] | None = None) -> None:
     """Put a panel's legend above it, where it hides nothing; entries are the panel's if left out."""
     if handles is None:
         handles = axes.get_legend_handles_labels()[0]
-    axes.legend(
-        handles=handles,
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.1,
-        ncols=max(len(handles), 1),
-        columnspacing=1.4,
-        frameon=False,
-    )
+    _legend(axes, handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
 
 
 def _finish_panels(panels: Sequence[Axes]) -> None:
@@ -153,14 +150,7 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path, shown
     _draw_runs(panels[-1], compensated or runs, "change", shown.small, "change of command\nx_dm − x_d")
     panels[-1].set_xlabel("time [s]")
     handles = [*panels[1].get_lines(), *(_shade(panels[1:], first) if len(runs) == 1 else [])]
-    figure.legend(
-        handles=handles,
-        title="RMS of the tracking error (true position)",
-        loc="outside lower center",
-        ncols=len(handles),
-        columnspacing=1.4,
-        frameon=False,
-    )
+    _legend(figure, handles, loc="outside lower center", title="RMS of the tracking error (true position)")
     _finish_panels(panels)
     figure.align_ylabels()
     save_figure(figure, path)

@@ -195,13 +195,8 @@ class Report:
         from plotly.io import to_html
 
         self._n_charts += 1
-        drawn = to_html(
-            chart.figure(),
-            {"responsive": True, "displayModeBar": False},
-            full_html=False,
-            include_plotlyjs=self._n_charts == 1,
-            div_id=f"chart{self._n_charts}",
-        )
+        how = {"full_html": False, "include_plotlyjs": self._n_charts == 1, "div_id": f"chart{self._n_charts}"}
+        drawn = to_html(chart.figure(), {"responsive": True, "displayModeBar": False}, **how)
         caption = f"<figcaption>{html.escape(chart.caption)}</figcaption>" if chart.caption else ""
         self._parts.append(f"<figure>{drawn}{caption}</figure>")
 

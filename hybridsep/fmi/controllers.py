@@ -82,16 +82,9 @@ def axis_header(machine: Machine, model: str, weights: bytes | None = None) -> s
     ]
     modes = [f"    {{{mode.f_n!r}, {mode.zeta!r}, {mode.alpha!r}, {mode.beta!r}}}," for mode in machine.model.modes]
     name = machine.name
-    return filled(
-        "axis.h",
-        version=__version__,
-        name=name,
-        kind="compensator" if compensates else "predictor",
-        modes="\n".join(modes),
-        weights=_weights(name, weights),
-        settings="\n".join(settings),
-        n_modes=len(modes),
-    )
+    kind = "compensator" if compensates else "predictor"
+    lines = {"modes": "\n".join(modes), "weights": _weights(name, weights), "settings": "\n".join(settings)}
+    return filled("axis.h", version=__version__, name=name, kind=kind, n_modes=len(modes), **lines)
 
 
 def _weights(name: str, content: bytes | None) -> str:

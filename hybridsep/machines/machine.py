@@ -56,11 +56,6 @@ class Machine(FileSection):
 
     def check(self) -> None:
         """Raise ParameterError if plant and physics, or the compensator's entries, are inconsistent."""
-        self._check_plant()
-        if self.drive_limits is not None or "compensator" in self.table:
-            self._check_compensator()
-
-    def _check_plant(self) -> None:
         if isinstance(self.plant, FeedDriveSection) and self.physics.spring_mass_damper is None:
             raise ParameterError("a plant of kind feed_drive needs [physics.spring_mass_damper]")
         if isinstance(self.plant, StageSection) and not self.physics.mode:
@@ -72,6 +67,8 @@ class Machine(FileSection):
         if self.plant is not None:
             self.new_plant()  # raises if the combination is out of range
         _ = self.model  # raises if the mode of m, c and k is out of range
+        if self.drive_limits is not None or "compensator" in self.table:
+            self._check_compensator()
 
     def _check_compensator(self) -> None:
         """Raise ParameterError if the compensator's predictor is out of range, or cannot plan by its own entries.
@@ -184,7 +181,7 @@ class Machine(FileSection):
         assert self.plant is not None
         values = {**self.plant.values("kind", "noise_std", "seed", "mode"), **changes}
         if isinstance(self.plant, FeedDriveSection):
-            assert self.physics.spring_mass_damper is not None  # by _check_plant
+            assert self.physics.spring_mass_damper is not None  # by check
             return FeedDrive(**self.physics.spring_mass_damper.values(), **values)
         if isinstance(self.plant, IdentifiedSection):
             values = {"input_hold": self.physics.input_hold, **values}

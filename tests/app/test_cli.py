@@ -8,6 +8,7 @@ import fmpy
 import numpy as np
 import pytest
 from command_line import Run, predictor, write_log, write_rows
+from machine_files import changed_machine
 from staircase_data import commanded
 
 from hybridsep import Encoder, cosimulate, load_machine, staircase
@@ -46,9 +47,7 @@ def test_backtest_of_what_cosim_writes(hybridsep: Run, tmp_path: Path) -> None:
         out = hybridsep.done("backtest", tmp_path / f"run{suffix}", "-m", machine.name, "--json", *options)
         expected = backtest(machine.new_predictor(), run.x_d, x).summary()
         assert json.loads(out)["rms_h_um"] == pytest.approx(expected["rms_h_um"], rel=1e-6)
-    named = tmp_path / "machine.toml"
-    text = (data_folder("models") / "spring_mass_damper.toml").read_text(encoding="utf-8")
-    named.write_text(text + '\n[log]\nx = "x"\n', encoding="utf-8")
+    named = changed_machine(tmp_path / "machine.toml", machine.name, more='\n[log]\nx = "x"\n')
     out = hybridsep.done("backtest", tmp_path / f"run{suffix}", "-m", named, "--json")
     true = backtest(machine.new_predictor(), run.x_d, run.x).summary()
     assert json.loads(out)["rms_h_um"] == pytest.approx(true["rms_h_um"], rel=1e-6)
@@ -137,9 +136,7 @@ def test_cosim_of_two_axes_along_a_path(hybridsep: Run, tmp_path: Path) -> None:
 
 
 def test_two_axes_are_delayed_alike(hybridsep: Run, tmp_path: Path) -> None:
-    text = (data_folder("models") / "als25010_y.toml").read_text(encoding="utf-8")
-    y = tmp_path / "y.toml"
-    y.write_text(text.replace("preview = 200", "preview = 150"), encoding="utf-8")
+    y = changed_machine(tmp_path / "y.toml", "als25010_y", ("preview = 200", "preview = 150"))
     err = hybridsep.refused("cosim", "als25010_x", y, "--path", "part.ngc")
     assert "one preview, got 0.001 s and 200 samples and 0.001 s and 150 samples" in err
 

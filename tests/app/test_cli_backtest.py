@@ -84,10 +84,8 @@ def test_a_rotary_axis(hybridsep: Run, tmp_path: Path) -> None:
     linear, rotary = tmp_path / "axis.toml", tmp_path / "table.toml"
     linear.write_text(text, encoding="utf-8")
     rotary.write_text(text.replace("T_s =", 'unit = "rad"\nT_s =', 1) + '[log]\nx = "angle"\n', encoding="utf-8")
-    t = np.arange(2500) * 1e-3
-    columns = np.column_stack((t, np.degrees(commanded()[:2500]), np.degrees(measured(0)[:2500])))
-    log = tmp_path / "log.csv"
-    np.savetxt(log, columns, delimiter=",", header="t,x_d [deg],angle [deg]", comments="", fmt="%.17g")
+    columns = np.degrees(commanded()[:2500]), np.degrees(measured(0)[:2500])
+    log = write_rows(tmp_path / "log.csv", *columns, header="t,x_d [deg],angle [deg]")
     assert read_log(log, columns={"x": "angle"}).unit == "rad"
     expected = json.loads(hybridsep("backtest", write_log(tmp_path / "m.csv"), "-m", linear, "--json")[1])
     out = hybridsep.done("backtest", log, "-m", rotary, "--json")

@@ -11,9 +11,9 @@ from built_once import BuiltFmus
 from command_line import Run, write_log
 from library_stream import trained_state
 from log_files import write
+from machine_files import changed_machine
 
 from hybridsep.app.console import written_before
-from hybridsep.machines.machine import machine_path
 
 MACHINE = "spring_mass_damper"
 
@@ -21,12 +21,6 @@ MACHINE = "spring_mass_damper"
 @pytest.fixture
 def log(tmp_path: Path) -> Path:
     return write_log(tmp_path / "log.csv", n=1000)
-
-
-def own_machine(folder: Path) -> Path:
-    path = folder / "machine.toml"
-    path.write_bytes(machine_path(MACHINE).read_bytes())
-    return path
 
 
 def refusal(run: Run, *arguments: object) -> str:
@@ -44,7 +38,7 @@ def refusal(run: Run, *arguments: object) -> str:
 def test_what_is_read_is_not_overwritten(
     hybridsep: Run, tmp_path: Path, log: Path, link: Callable[[Path, Path], object] | None
 ) -> None:
-    machine = own_machine(tmp_path)
+    machine = changed_machine(tmp_path / "machine.toml", MACHINE)
     trajectory = write(tmp_path / "command.csv", {"t": np.arange(200) * 1e-3, "x_d": np.zeros(200)})
     for file, what, option, command in (
         (log, "log", "--save", ("backtest", log, "-m", machine, "--force")),
@@ -62,7 +56,7 @@ def test_what_is_read_is_not_overwritten(
 
 
 def test_build_does_not_overwrite_its_machine(hybridsep: Run, tmp_path: Path) -> None:
-    machine = own_machine(tmp_path)
+    machine = changed_machine(tmp_path / "machine.toml", MACHINE)
     before = machine.read_bytes()
     (tmp_path / "FeedDrivePy.fmu").symlink_to(machine)
     arguments = ("FeedDrivePy", "-m", machine, "--flavour", "python", "--out", tmp_path)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from command_line import Run, write_rows
 from identification_cases import T_S
+from machine_files import changed_machine
 from places import LOOPS
 
 from hybridsep import PAPER_LIMITS, ModalModel, Mode, load_machine, rest_to_rest
@@ -154,12 +155,11 @@ def test_what_a_limit_costs_is_said_and_larger_ones_are_advised() -> None:
 def test_cosim_says_which_limit_binds_and_what_it_costs(
     hybridsep: Run, tmp_path: Path, change_max: float, bound: dict[str, float], most: float
 ) -> None:
-    text = (LOOPS / "axis.toml").read_text(encoding="utf-8")
-    limits = f"[drive_limits]\nchange_max = {change_max}"
-    (tmp_path / "axis.toml").write_text(text.replace("[drive_limits]", limits), encoding="utf-8")
+    limits = ("[drive_limits]", f"[drive_limits]\nchange_max = {change_max}")
+    machine = changed_machine(tmp_path / "axis.toml", LOOPS / "axis.toml", limits)
     with gzip.open(LOOPS / "commands.csv.gz") as commands:
         (tmp_path / "commands.csv").write_bytes(commands.read())
-    out = hybridsep.done("cosim", "-m", tmp_path / "axis.toml", "--compensate", "hybrid", "--json")
+    out = hybridsep.done("cosim", "-m", machine, "--compensate", "hybrid", "--json")
     found = json.loads(out)
     assert found["limits_that_bind"] == pytest.approx(bound, abs=1e-3)
     assert found["tracking_rms_um"] < most

@@ -11,7 +11,6 @@ from command_line import Run, write_rows
 from oracle import arx_by_definition, free_run_by_definition
 from places import RECORDINGS
 from plotly.offline import get_plotlyjs
-from quick_fits import without_larger_structures, without_other_settings
 from staircase_data import commanded, measured
 
 from hybridsep import read_log
@@ -59,11 +58,8 @@ def test_the_hybrid_is_not_recommended_where_an_arx_is_better(hybridsep: Run, tm
 
 
 @pytest.mark.slow
-def test_the_physics_model_is_judged_with_its_offset(
-    hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    without_larger_structures(monkeypatch)
-    without_other_settings(monkeypatch)
+@pytest.mark.usefixtures("quick_fit")
+def test_the_physics_model_is_judged_with_its_offset(hybridsep: Run, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     x_d = commanded()[:800]
     log = write_rows(tmp_path / "axis.csv", x_d, x_d + 40e-6 + 1e-6 * rng.normal(size=800))
@@ -80,9 +76,7 @@ def test_a_headline_says_share_rate_and_the_logs_own_unit(hybridsep: Run, tmp_pa
     """1 kHz, its sensor renewed every 2 ms, in degrees."""
     x = 3000 * measured(0)[:1600]
     x[1::2] = x[::2]
-    rows = np.column_stack((np.arange(1600) * 1e-3, 3000 * commanded()[:1600], x))
-    log = tmp_path / "axis.csv"
-    np.savetxt(log, rows, delimiter=",", header="t,x_d [deg],x [deg]", comments="", fmt="%.12g")
+    log = write_rows(tmp_path / "axis.csv", 3000 * commanded()[:1600], x, header="t,x_d [deg],x [deg]")
     out = hybridsep.done("fit", log, "--out", tmp_path / "fit", "--Np", 40)
     words = " ".join(out.split())
     head = "800 of 1600 samples (50 %), 1.6 s at 500 Hz (recorded at 1000 Hz)"

@@ -47,13 +47,8 @@ def test_random_loops_command_the_same(seed: int, model: str, fixed: dict[str, f
 @pytest.mark.parametrize(
     ("seed", "model", "start", "n_rest", "n"),
     [
-        (
-            20,
-            f"{COMPENSATOR}_als25010_y",
-            -3.3,
-            10,
-            400,
-        ),  # limits on third differences of positions that are far from 0
+        # Limits on third differences of positions that are far from 0
+        (20, f"{COMPENSATOR}_als25010_y", -3.3, 10, 400),
         (13, f"{COMPENSATOR}_als25010_y", -3.3, 100, 700),
         (149, COMPENSATOR, 0.1745, 200, 500),  # a plan does not depend on the splines that it does not change
     ],

@@ -2,11 +2,11 @@
 
 import ctypes
 from fractions import Fraction
-from typing import Any
 
 import c_core
 import numpy as np
 import pytest
+from c_core import pointer
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from stream import PREDICTOR
@@ -24,10 +24,6 @@ OFFSETS = ("penalties", "weights", "factor", "left", "least", "rows", "work", "a
 """Of hsep_solution, the offsets behind the other words."""
 
 
-def pointer(array: Array) -> Any:
-    return array.ctypes.data_as(ctypes.c_void_p)
-
-
 class CGram:
     """hsep_gram."""
 
@@ -36,11 +32,8 @@ class CGram:
         self.library.hsep_gram_size.restype = self.library.hsep_gram_square.restype = ctypes.c_double
         self.library.hsep_gram_row.restype = ctypes.POINTER(ctypes.c_double)
         self.block = np.zeros(int(self.library.hsep_gram_size(ctypes.c_uint64(n))) // 8)
+        self._block = pointer(self.block)
         self.library.hsep_gram_init(self._block, ctypes.c_uint64(n))
-
-    @property
-    def _block(self) -> Any:
-        return pointer(self.block)
 
     def fold(self, rows: Array, target: Array) -> None:
         for row in np.column_stack((rows, target)):
@@ -93,6 +86,7 @@ class CSolution:
         self.library.hsep_solution_size.restype = self.library.hsep_solution_finish.restype = ctypes.c_double
         self.library.hsep_solution_left.restype = ctypes.c_double
         self.block = np.full(int(self.library.hsep_solution_size(*sizes)) // 8, np.nan)
+        self._block = pointer(self.block)
         self.library.hsep_solution_init(self._block, *sizes)
         self.n_head, self.m = n_head, m
         self._part("penalties", m)[:] = penalties
@@ -121,10 +115,6 @@ class CSolution:
 
     def left(self, to_come: int = 0) -> float:
         return float(self.library.hsep_solution_left(self._block, ctypes.c_uint64(to_come)))
-
-    @property
-    def _block(self) -> Any:
-        return pointer(self.block)
 
     def _part(self, name: str, count: int) -> Array:
         place = int(self.block.view(np.uint64)[len(WORDS) + OFFSETS.index(name)])

@@ -5,7 +5,6 @@ import math
 import re
 import shutil
 import subprocess
-import sys
 from dataclasses import asdict
 from itertools import product
 from pathlib import Path
@@ -13,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import staircase_data as staircase
-from c_compiler import C_SOURCES, compiler, include_flags
+from c_compiler import C_SOURCES, compiler, include_flags, zig
 from c_core import CModel
 from c_library import Library, configured, installed
 from library_stream import trained_state
@@ -213,7 +212,7 @@ def test_fast_math_is_refused(tmp_path: Path) -> None:
     assert "hsep needs IEEE 754 arithmetic" in refused.stderr
 
 
-COMPILERS = {"gcc": ["gcc"], "clang": ["clang"], "zig": [sys.executable, "-m", "ziglang", "cc"]}
+COMPILERS = {"gcc": ["gcc"], "clang": ["clang"], "zig": zig()}
 STANDARDS = ("c99", "c11", "c17", "c2x", "gnu17")
 
 

@@ -1,7 +1,6 @@
 """The C core's discretised modes and its regression against extended precision. Each test states its tolerance."""
 
 import ctypes
-from typing import Any
 
 import c_core
 import mpmath
@@ -9,7 +8,7 @@ import numpy as np
 import oracle
 import pytest
 import staircase_data as staircase
-from c_core import TS
+from c_core import TS, pointer
 from stream import PREDICTOR
 
 from hybridsep.base.signals import Array
@@ -69,21 +68,18 @@ class CRegression:
     def __init__(self, n: int, lam: float) -> None:
         self.library, self.n = c_core.library(PREDICTOR), n
         self.block = np.zeros(int(self.library.hsep_regression_size(ctypes.c_uint64(n))) // 8)
+        self._block = pointer(self.block)
         self.library.hsep_regression_init(self._block, ctypes.c_uint64(n), ctypes.c_double(lam))
-
-    @property
-    def _block(self) -> Any:
-        return self.block.ctypes.data_as(ctypes.c_void_p)
 
     def fold(self, rows: Array, target: Array, repetitions: int = 1) -> None:
         stacked = np.ascontiguousarray(np.column_stack((rows, target)))
-        pointer = stacked.ctypes.data_as(ctypes.c_void_p)
-        self.library.test_fold(self._block, pointer, ctypes.c_size_t(len(rows)), ctypes.c_size_t(repetitions))
+        count = ctypes.c_size_t(len(rows))
+        self.library.test_fold(self._block, pointer(stacked), count, ctypes.c_size_t(repetitions))
 
     @property
     def weights(self) -> Array:
         w = np.empty(self.n)
-        self.library.hsep_regression_solve(self._block, w.ctypes.data_as(ctypes.c_void_p))
+        self.library.hsep_regression_solve(self._block, pointer(w))
         return w
 
 

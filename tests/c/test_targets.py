@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from c_compiler import zig
 from c_library import Library
 from controllers import target_or_skip
 from places import SUPPORT
@@ -84,16 +85,10 @@ def test_contracted_products_would_be_seen(tmp_path: Path) -> None:
     assert (contracted.outputs != here.outputs).any()
 
 
-WASM = Target(
-    "wasm32",
-    (sys.executable, "-m", "ziglang", "cc", "-target", "wasm32-wasi"),
-    "board_host.c",
-    emulator=(sys.executable, str(SUPPORT / "run_wasi.py")),
-)
+RUN_WASI = (sys.executable, str(SUPPORT / "run_wasi.py"))
+WASM = Target("wasm32", tuple(zig("-target", "wasm32-wasi")), "board_host.c", emulator=RUN_WASI)
 
 
-@pytest.mark.nightly
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_outputs_are_those_of_this_machine(kind: str, tmp_path: Path) -> None:
     """The paper's drive, window and lags, warm; its libm is musl's."""

@@ -16,7 +16,7 @@ from typing import Any
 
 import fmpy.fmi1
 import pytest
-from built_once import BuiltFmus
+from built_once import BuiltFmus, changed
 
 from hybridsep import FmuInstance
 from hybridsep.base.errors import FmuError
@@ -34,16 +34,6 @@ def native(fmus: BuiltFmus) -> Path:
 def drive(request: pytest.FixtureRequest, fmus: BuiltFmus) -> Path:
     """The plant in both flavours."""
     return fmus(request.param)
-
-
-def changed(archive: Path, target: Path, change: Callable[[str, bytes], bytes | None]) -> Path:
-    """Copy an archive, each file as ``change`` gives it, without those for which it gives None."""
-    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(target, "w") as new:
-        for name in old.namelist():
-            content = change(name, old.read(name))
-            if content is not None:
-                new.writestr(name, content)
-    return target
 
 
 @pytest.fixture

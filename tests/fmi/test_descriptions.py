@@ -11,9 +11,10 @@ import pytest
 from built_once import FMI3, NATIVE, BuiltFmus, each_kind
 from command_line import Run
 from fmpy.validation import validate_fmu
+from machine_files import changed_machine
+from stream import WINDOWS
 
 from hybridsep.base.errors import FmuError, MachineError, SignalError
-from hybridsep.base.files import data_folder
 from hybridsep.cosim.fmu import FmuInstance
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.fmi.description import TERMINALS
@@ -23,7 +24,6 @@ from hybridsep.fmi.variables import INTERPOLATED
 from hybridsep.machines.machine import Machine, load_machine
 
 MACHINE = load_machine("spring_mass_damper")
-WINDOWS = ("x_d_window", "x_pb_window", "x_h_window", "x_h_std_window")
 
 
 def variables_of(path: Path) -> dict[str, Any]:
@@ -197,10 +197,8 @@ def test_windows_can_be_left_out_and_nothing_else_is_missing(
 
 
 def rotary(folder: Path, machine: str = "emps", more: str = "") -> Machine:
-    text = (data_folder("models") / f"{machine}.toml").read_text(encoding="utf-8")
-    path = folder / "table.toml"
-    path.write_text(text.replace("T_s =", 'unit = "rad"\nT_s =', 1) + more, encoding="utf-8")
-    return load_machine(path)
+    unit = ("T_s =", 'unit = "rad"\nT_s =')
+    return load_machine(changed_machine(folder / "table.toml", machine, unit, more=more))
 
 
 def test_a_rotary_axis_has_radians_for_metres(tmp_path: Path) -> None:

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from built_once import BuiltFmus
 from fmi_library import ERROR, OK, Library, Library3, library_of, steps
+from stream import WINDOWS
 
 from hybridsep.base.errors import FmuError
 from hybridsep.cosim.fmu import FmuInstance
-
-WINDOWS = ("x_d_window", "x_pb_window", "x_h_window", "x_h_std_window")
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ import os
 import platform
 import shutil
 import subprocess
-import sys
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import NamedTuple
 import fmpy
 import numpy as np
 import pytest
-from c_compiler import FLAGS, FMI_HEADERS
+from c_compiler import FLAGS, FMI_HEADERS, zig
 from places import ROOT
 from programs import output_of
 
@@ -70,44 +69,22 @@ def play(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str, st
         target, runner, _, triple = RUNNERS[platform]
         absolute = "Z:" if platform == "Windows" else ""
         if not host.exists():
-            zig = [
-                sys.executable,
-                "-m",
-                "ziglang",
-                "cc",
-                "-target",
-                triple,
-                "-fno-sanitize=all",
-                "-dynamic",
-                *FLAGS,
-                "-O2",
-            ]
+            compiler = zig("-target", triple, "-fno-sanitize=all", "-dynamic", *FLAGS, "-O2")
             libraries = ["-ldl"] if target.endswith("linux") else []
             source = ROOT / "tests" / "c" / "host.c"
-            subprocess.run([*zig, f"-I{FMI_HEADERS}", str(source), "-o", str(host), *libraries], check=True)
+            subprocess.run([*compiler, f"-I{FMI_HEADERS}", str(source), "-o", str(host), *libraries], check=True)
         (library,) = (folder / "binaries" / TARGETS[target].folder).iterdir()
         described = fmpy.read_model_description(str(folder))
-        references: dict[str, list[str]] = {
-            causality: [
-                str(v.valueReference) for v in described.modelVariables if v.causality == causality and v.type == "Real"
-            ]
+        inputs, outputs = (
+            [v.valueReference for v in described.modelVariables if v.causality == causality and v.type == "Real"]
             for causality in ("input", "output")
-        }
+        )
         given, signals = folder / REFERENCE_FOLDER / f"{model}_in.csv", folder / "signals.bin"
         rows = np.loadtxt(given, delimiter=",", skiprows=1)[:, 1:] if given.exists() else np.zeros((600, 1))
         rows.astype("<f8").tofile(signals)
         uri = f"file:///{absolute}{folder / 'resources'}".replace("////", "///")
-        command = [
-            *runner,
-            str(host),
-            f"{absolute}{library}",
-            described.guid,
-            uri,
-            "1e-3",
-            str(len(references["input"])),
-        ]
-        command += [*references["input"], *references["output"], f"{absolute}{signals}"]
-        printed = output_of(*command, timeout=900, env=wine)
+        given_to_host = [f"{absolute}{library}", described.guid, uri, "1e-3", len(inputs), *inputs, *outputs]
+        printed = output_of(*runner, host, *given_to_host, f"{absolute}{signals}", timeout=900, env=wine)
         return np.array([[float.fromhex(number) for number in line.split()] for line in printed.splitlines()])
 
     yield played

@@ -10,14 +10,7 @@ from pathlib import Path
 
 import fuzz_fmi
 import pytest
-from c_compiler import (
-    C_SOURCES,
-    SANITISED,
-    address_sanitizer,
-    needs_sanitisers,
-    run_compiler,
-    sanitising_compiler,
-)
+from c_compiler import C_SOURCES, SANITISED, address_sanitizer, needs_sanitisers, run_compiler, sanitising_compiler
 from c_core import object_files
 from places import ROOT
 
@@ -70,15 +63,8 @@ def test_random_calls_under_sanitizers(
         rest.write_text("".join(f'#include "{path.name}"\n' for path in sorted(source.glob("*.c")) if path.name in own))
         files: list[str | Path] = ["-include", COUNTED, f"-I{source}", rest, *core, "-lm", "-ldl", "-o", library]
         run_compiler([*SANITISED, "-D_GNU_SOURCE", "-shared", *files], command=compiler)
-        command = [
-            sys.executable,
-            fuzz_fmi.__file__,
-            str(folder),
-            "--seconds",
-            str(factor * FUZZED[name]),
-            "--seed",
-            "1",
-        ]
+        options = ["--seconds", str(factor * FUZZED[name]), "--seed", "1"]
+        command = [sys.executable, fuzz_fmi.__file__, str(folder), *options]
         result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         held = result.returncode == 0 and "no finding" in result.stdout
         return "" if held else f"{name}: {result.stdout}{result.stderr}"

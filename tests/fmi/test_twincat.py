@@ -4,14 +4,13 @@ Neither that compiler nor TE1420 is at hand. Clang, in the ziglang wheel, compil
 declare what a source FMU needs and nothing more (tests/c/msvc).
 """
 
-import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
 import fmpy
 import pytest
 from built_once import BuiltFmus
-from c_compiler import FMI_HEADERS, run_compiler
+from c_compiler import FMI_HEADERS, run_compiler, zig
 from command_line import Run
 from library_stream import trained_state
 from places import ROOT
@@ -19,10 +18,10 @@ from places import ROOT
 from hybridsep.fmi.controllers import CONFIGURATION_FILE, DEFINITIONS
 
 STAND_INS = ROOT / "tests" / "c" / "msvc"
-MICROSOFT = [
-    *(sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-msvc", "-fms-compatibility", "-Wmicrosoft"),
+MICROSOFT = zig(
+    *("-target", "x86_64-windows-msvc", "-fms-compatibility", "-Wmicrosoft"),
     *("-Wvla", "-nostdlibinc", f"-isystem{STAND_INS}"),
-]
+)
 
 
 def unpacked(fmu: Path, folder: Path) -> Path:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_line import Run
-from quick_fits import without_larger_structures, without_other_settings
+from quick_fits import without_larger_structures
 
 import hybridsep
 from benchmarks.outside.xiao import AXES, T_S, XiaoDrive, other_program
@@ -66,11 +66,8 @@ def test_gains_that_cannot_be(changed: dict[str, Any], message: str) -> None:
 
 
 @pytest.mark.slow
-def test_gains_on_the_command_line(
-    hybridsep: Run, log: tuple[Array, Array], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    without_larger_structures(monkeypatch)
-    without_other_settings(monkeypatch)
+@pytest.mark.usefixtures("quick_fit")
+def test_gains_on_the_command_line(hybridsep: Run, log: tuple[Array, Array], tmp_path: Path) -> None:
     rows = np.column_stack(log)[:3000]
     np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header="x_d [m],x [m]", comments="")
 
@@ -99,10 +96,9 @@ def test_a_loop_that_friction_hides_is_said_not_to_be_identified(
 
 
 @pytest.mark.slow
-def test_a_fit_of_given_gains(log: tuple[Array, Array], monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.usefixtures("quick_fit")
+def test_a_fit_of_given_gains(log: tuple[Array, Array]) -> None:
     """The model is theirs whatever the log says, and the log's word on them is a finding."""
-    without_larger_structures(monkeypatch)
-    without_other_settings(monkeypatch)
     x_d, x = log
     found = hybridsep.fit(x_d, x, T_s=T_S, Np=50, cascade=gains("X"))
     assert [mode.f_n for mode in found.machine.model.modes] == pytest.approx([25.26, 1.325], rel=1e-3)

@@ -11,6 +11,7 @@ from built_once import built_once, shared_builds
 from c_compiler import compiler
 from hypothesis import given
 from hypothesis import strategies as st
+from machine_files import changed_machine
 from places import ROOT
 from programs import output_of
 from properties import examples
@@ -112,15 +113,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("axes")
 
 
-def changed(folder: Path, name: str, *changes: tuple[str, str], source: Path = X) -> Machine:
+def changed(folder: Path, name: str, *changes: tuple[str, str]) -> Machine:
     """Return a machine with parts of its file's text replaced."""
-    text = source.read_text(encoding="utf-8")
-    for old, new in (('name = "x"', f'name = "{name}"'), ("preview = 100", "preview = 60"), *changes):
-        assert old in text or name in text
-        text = text.replace(old, new)
-    path = folder / f"{name}.toml"
-    path.write_text(text, encoding="utf-8")
-    return load_machine(path)
+    always = ('name = "x"', f'name = "{name}"'), ("preview = 100", "preview = 60")
+    return load_machine(changed_machine(folder / f"{name}.toml", X, *always, *changes))
 
 
 class Run:

@@ -271,8 +271,7 @@ def test_a_machine_can_be_made_in_code() -> None:
 @pytest.mark.parametrize("name", machine_names())
 def test_a_written_machine_is_read_again(name: str, tmp_path: Path) -> None:
     machine = load_machine(name)
-    path = tmp_path / "axis.toml"
-    path.write_text(machine_text(machine, ["identified", "two lines\nof text"]), encoding="utf-8")
+    path = write(tmp_path, machine_text(machine, ["identified", "two lines\nof text"]))
     assert load_machine(path) == machine
     assert path.read_text(encoding="utf-8").startswith("# identified\n# two lines\n# of text\nname = ")
 
@@ -280,8 +279,7 @@ def test_a_written_machine_is_read_again(name: str, tmp_path: Path) -> None:
 def test_text_with_quotes_and_no_sources(tmp_path: Path) -> None:
     physics = {"spring_mass_damper": {"m": 2.0, "c": 30.0, "k": 2e4}}
     machine = machine_from_table({"name": "a", "title": 'the "old" axis \\ Y', "physics": physics})
-    path = tmp_path / "axis.toml"
-    path.write_text(machine_text(machine), encoding="utf-8")
+    path = write(tmp_path, machine_text(machine))
     assert load_machine(path) == machine
     assert load_machine(path).sources == ()
 
@@ -325,8 +323,7 @@ def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
     ],
 )
 def test_messages_are_one_line_of_a_reasonable_length(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "machine.toml"
-    path.write_text(text)
+    path = write(tmp_path, text)
     with pytest.raises(MachineError, match=message) as caught:
         load_machine(path)
     assert len(str(caught.value)) < 1000

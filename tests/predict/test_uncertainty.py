@@ -39,6 +39,16 @@ def after_noise(std: float, n: int = 60, seed: int = 0, uncertainty: Uncertainty
     return learning
 
 
+def after_a_hundred(errors: Array) -> list[tuple[Array, Array]]:
+    """Return errors and deviations of windows at rest behind the first hundred; all are learned."""
+    uncertainty, found = Uncertainty.init(1e-12), []
+    for one in errors:
+        predicted = window(uncertainty)
+        found.append((one, predicted.std))
+        uncertainty = uncertainty.learn(predicted, one, ALL, N)
+    return found[100:]
+
+
 @pytest.mark.parametrize("std", [1e-9, 5e-6, 1e-3])
 def test_white_noise_of_any_size_is_known_after_a_second(std: float) -> None:
     predicted = window(after_noise(std, 10)).std
@@ -76,28 +86,16 @@ def test_larger_noise_is_followed() -> None:
 
 
 def test_heavy_tails_are_missed_alike_by_the_three_intervals() -> None:
-    rng, uncertainty, inside = np.random.default_rng(3), Uncertainty.init(1e-12), []
-    for k in range(400):
-        predicted = window(uncertainty)
-        errors = 1e-6 * rng.standard_t(3.5, N)
-        if k >= 100:
-            inside.append([coverage(errors, predicted.std, level) for level in LEVELS])
-        uncertainty = uncertainty.learn(predicted, errors, ALL, N)
-    shares = np.mean(inside, axis=0)
+    windows = after_a_hundred(1e-6 * np.random.default_rng(3).standard_t(3.5, (400, N)))
+    shares = np.mean([[coverage(errors, std, level) for level in LEVELS] for errors, std in windows], axis=0)
     assert shares.sum() == pytest.approx(sum(LEVELS), abs=0.02)
     np.testing.assert_allclose(shares, LEVELS, atol=0.055)
 
 
 @pytest.mark.parametrize("growth", [0.2, 5.0])
 def test_an_error_that_grows_or_shrinks_over_the_window_is_covered_at_each_third(growth: float) -> None:
-    rng, uncertainty, inside = np.random.default_rng(4), Uncertainty.init(1e-12), []
-    std = 1e-6 * growth ** (np.arange(N) / N)
-    for k in range(400):
-        predicted = window(uncertainty)
-        errors = rng.normal(0.0, std)
-        if k >= 100:
-            inside.append(np.abs(errors) <= 1.645 * predicted.std)
-        uncertainty = uncertainty.learn(predicted, errors, ALL, N)
+    drawn = np.random.default_rng(4).normal(0.0, 1e-6 * growth ** (np.arange(N) / N), (400, N))
+    inside = [np.abs(errors) <= 1.645 * std for errors, std in after_a_hundred(drawn)]
     shares = [part.mean() for part in np.array_split(np.mean(inside, axis=0), 3)]
     np.testing.assert_allclose(shares, 0.9, atol=0.04)
 

@@ -12,6 +12,7 @@ from stream import (
     COMPENSATOR,
     DRIVE,
     LOOK_AHEADS,
+    MODELS,
     PLANTS,
     PREDICTOR,
     STAGE,
@@ -112,7 +113,7 @@ def assert_refused(stream: Stream, t: float, h: float, message: str) -> None:
     assert stream.outputs() == outputs
 
 
-@on_adapters((*LOOK_AHEADS, TRAJECTORY, *PLANTS))
+@on_adapters(MODELS)
 @pytest.mark.parametrize("h", [0.0, -T_S, math.nan, math.inf, 100.5])
 def test_a_step_size_that_cannot_be_changes_nothing(new_stream: StreamMaker, h: float) -> None:
     stream = new_stream.begun()

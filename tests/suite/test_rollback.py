@@ -15,20 +15,18 @@ from stream import (
     FMI3,
     LIBRARY,
     LOOK_AHEADS,
+    MODELS,
     NATIVE,
-    PLANTS,
     PREDICTOR,
-    TRAJECTORY,
     RefusedStreamError,
     Stream,
     Value,
 )
 from streams import StreamMaker, on_adapters
 
-ALL = (*LOOK_AHEADS, TRAJECTORY, *PLANTS)
 N_SAMPLES = 200
 
-every = on_adapters(ALL)
+every = on_adapters(MODELS)
 
 
 class Times:
@@ -140,7 +138,7 @@ def test_states_go_on_in_another_process(fmus: BuiltFmus, tmp_path: Path) -> Non
     expected = {}
     for implementation in (LIBRARY, NATIVE):
         maker = StreamMaker(implementation, "", fmus, tmp_path)
-        for model in ALL:
+        for model in MODELS:
             if (implementation, model) not in CANNOT:
                 stream = maker(model)
                 initialise(stream)
@@ -153,7 +151,7 @@ def test_states_go_on_in_another_process(fmus: BuiltFmus, tmp_path: Path) -> Non
             assert pool.submit(go_on, name, tmp_path, fmus.folder).result() == outputs
 
 
-@on_adapters(ALL, needs="bad states")
+@on_adapters(MODELS, needs="bad states")
 def test_damaged_and_truncated_states_are_refused(new_stream: StreamMaker) -> None:
     stream = new_stream.begun()
     steps(stream, 0, 130)

@@ -11,6 +11,7 @@ from stream import (
     DRIVE,
     FMI3,
     LOOK_AHEADS,
+    MODELS,
     OUTPUTS,
     PLANTS,
     PREDICTOR,
@@ -21,10 +22,8 @@ from stream import (
 )
 from streams import StreamMaker, on_adapters
 
-ALL = (*LOOK_AHEADS, TRAJECTORY, *PLANTS)
 
-
-@on_adapters(ALL, needs="stop time")
+@on_adapters(MODELS, needs="stop time")
 def test_the_stop_time_is_reached_in_rounded_sums(new_stream: StreamMaker) -> None:
     stream = new_stream()
     stream.initialise({}, stop=0.1)

@@ -77,6 +77,16 @@ def content(path: Path) -> dict[str, bytes]:
         return {name: archive.read(name) for name in archive.namelist()}
 
 
+def changed(archive: Path, target: Path, change: Callable[[str, bytes], bytes | None]) -> Path:
+    """Copy an archive, each file as ``change`` gives it, without those for which it gives None."""
+    with zipfile.ZipFile(archive) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            content = change(name, old.read(name))
+            if content is not None:
+                new.writestr(name, content)
+    return target
+
+
 class BuiltFmus:
     """The FMUs of all machines in both flavours, for this machine; ``folder``: shared by a session's workers."""
 

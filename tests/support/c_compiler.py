@@ -28,6 +28,11 @@ SANITISED = (
 """Options of builds with sanitizers. Not optimised: that would take three times as long to compile."""
 
 
+def zig(*options: str) -> list[str]:
+    """Return the command of the ziglang wheel's compiler."""
+    return [sys.executable, "-m", "ziglang", "cc", *options]
+
+
 def compiler() -> list[str]:
     """Return the command of a C compiler, or say that there is none."""
     if os.environ.get("CC"):
@@ -36,7 +41,7 @@ def compiler() -> list[str]:
         if path := shutil.which(name):
             return [path]
     if find_spec("ziglang"):
-        return [sys.executable, "-m", "ziglang", "cc"]
+        return zig()
     raise RuntimeError("the C core needs a C compiler: set CC, or install cc, gcc, clang or the ziglang package")
 
 
@@ -71,13 +76,8 @@ def address_sanitizer(command: Sequence[str]) -> str:
 
 def run_compiler(arguments: Sequence[str | Path], *, command: Sequence[str] = ()) -> None:
     """Compile, with the host's compiler if no other is asked for, or raise with what it said."""
-    done = subprocess.run(
-        [*(command or compiler()), *FLAGS, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=build_folder(),
-    )
+    line = [*(command or compiler()), *FLAGS, *map(str, arguments)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False, cwd=build_folder())
     if done.returncode:
         raise RuntimeError(f"the C compiler failed:\n{done.stderr}")
 

@@ -186,7 +186,7 @@ class CModel:
 
     @property
     def _state(self) -> Any:
-        return self.state.ctypes.data_as(ctypes.c_void_p)
+        return pointer(self.state)
 
     def _call(self, function: str, *arguments: Any) -> None:
         message = ctypes.create_string_buffer(b"\0" * MESSAGE_SIZE + b"unwritten")
@@ -195,6 +195,11 @@ class CModel:
         if status == 1:
             raise RefusedError(message.value.decode("utf-8"))
         self.warning = message.value.decode("utf-8") if status else ""
+
+
+def pointer(array: Array) -> Any:
+    """Return the address of an array's numbers, for a call into the library."""
+    return array.ctypes.data_as(ctypes.c_void_p)
 
 
 def write_trajectory(folder: Path, samples: Array, T_s: float = TS) -> None:

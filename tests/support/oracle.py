@@ -92,12 +92,11 @@ def ridge_extended(rows: Array, target: Array, lam: float) -> LongArray:
 
 @dataclass
 class OracleRun:
-    """Result of the oracle for a whole run, one entry per sample, m; ``weights`` one per window."""
+    """Result of the oracle for a whole run, one entry per sample, m."""
 
     x_pb: list[float] = field(default_factory=list)
     x_h: list[float] = field(default_factory=list)
     active: list[bool] = field(default_factory=list)
-    weights: list[Array] = field(default_factory=list)
 
 
 def run(
@@ -131,7 +130,6 @@ def run(
         batch = range(first, min(first + Np, len(relative)))
         # Eq. (6): the weights of this batch, from all rows before it
         w = ridge(np.array(rows), np.array(e_pb), lam) if rows else np.zeros(2 + q + p)
-        out.weights.append(w)
         # Eq. (4): residuals of this batch are unknown and stand as their own predictions
         guessed = list(e_pb)
         for k in batch:

@@ -22,6 +22,7 @@ STAGE_PREDICTOR, STAGE_COMPENSATOR = "HybridPredictor_als25010_x", "SepCompensat
 DRIVE, STAGE = "FeedDrive", "FeedDrive_als25010_x"
 LOOK_AHEADS = (PREDICTOR, COMPENSATOR)
 PLANTS = (DRIVE, STAGE)
+MODELS = (*LOOK_AHEADS, TRAJECTORY, *PLANTS)
 
 CANNOT = {
     (LIBRARY, TRAJECTORY): "an array of positions needs no player",

@@ -69,11 +69,8 @@ def _after_play(x: Array, width: Array, start: Array) -> Array:
 def _motion(models: Sequence[ModalModel], values: dict[str, Array], u: Array) -> Array:
     """Return the positions before ``u(k)`` acts, ``(n, m)``, m."""
     n, m = u.shape
-    tables = [_tables(model, H) for model in models]
-    A = np.stack([table[0] for table in tables], axis=-1)  # (2, 2, 4, m)
-    B = np.stack([table[1] for table in tables], axis=-1)
-    command = np.stack([table[2] for table in tables], axis=-1)
-    force = np.stack([table[3] for table in tables], axis=-1)
+    tables = zip(*(_tables(model, H) for model in models), strict=True)
+    A, B, command, force = (np.stack(parts, axis=-1) for parts in tables)  # (2, 2, 4, m), …
     # First the response to the command, then that to the nonlinearities: (2, 4, m) each.
     C = np.stack((command, np.where(values["at_command"] > 0, command, force)))
     c_1, c_2 = np.ascontiguousarray(C[:, 0]), np.ascontiguousarray(C[:, 1])
