@@ -336,9 +336,8 @@ class AveragedPlanning(Planning):
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
             assert self.splines is not None
-            planner = AveragedPlanner(
-                self.basis, self.splines, self.settings.jerk_weight, model, path, preview.delta_before
-            )
+            jerk_weight = self.settings.jerk_weight
+            planner = AveragedPlanner(self.basis, self.splines, jerk_weight, model, path, preview.delta_before)
             ends = bool(self.paused) and most is SepState.HYBRID
             known = None if ends else model.of_previous_plan
             last = planner.point(self.ending(preview) if ends else previous_plan, prediction=known)

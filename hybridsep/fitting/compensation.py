@@ -60,10 +60,7 @@ _DEMANDING = 2000  # most samples of the stretch on which limits and look-aheads
 _LITTLE = 0.01  # share of the error without compensation below which errors are alike
 
 _EXPLAINED = 0.7  # share of the error that the physics model's compensation leaves, from which on it knows little
-
-_LITTLE_KNOWN = (
-    " The physics model explains little of the error, so this leaves out most of what the axis does: it may be far off."
-)
+_UNEXPLAINED = " The physics model explains little of the error, so this leaves out most of it, and may be far off."
 
 _HOW = (
     "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the log is "
@@ -333,7 +330,7 @@ class Tracking:
             *(self.costs.lines(shown) if self.costs is not None else ()),
             *(self.look_aheads.lines() if self.look_aheads is not None else ()),
             trips,
-            _HOW + (_LITTLE_KNOWN if self.physics.rms > _EXPLAINED * self.none.rms else ""),
+            _HOW + (_UNEXPLAINED if self.physics.rms > _EXPLAINED * self.none.rms else ""),
         ]
 
     def _rival_words(self) -> str:

@@ -84,10 +84,7 @@ class Structure:
         return np.log(low), np.log(high)
 
     def slowest_rate(self, theta: Array) -> float:
-        """Return the rate of its slowest pole, 1/s, of one that swings at least its frequency; infinite without poles.
-
-        A swing shows in a few periods, however slowly it decays.
-        """
+        """Return the rate of its slowest pole, 1/s, of one that swings at least its frequency; infinite without any."""
         omegas, zetas = np.exp(theta[: 2 * self.n_modes : 2]), np.exp(theta[1 : 2 * self.n_modes : 2])
         decays = omegas * np.where(zetas > 1, zetas - np.sqrt(np.maximum(zetas**2 - 1, 0.0)), zetas)
         rates = np.where(zetas > 1, decays, np.maximum(decays, omegas / (2.0 * np.pi)))
