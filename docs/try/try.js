@@ -45,10 +45,14 @@ function split(line, separator) {
   return cells.map((cell) => cell.replace(new RegExp(`${separator}$`), "").trim().replace(/^["'](.*)["']$/, "$1").trim());
 }
 
-/** Whether whole numbers below 1000 have no comma in a column, and others one: no decimals come and go so. */
+/** Whether whole numbers below 1000 have no comma in a column, and others one, and its steps are smaller so. */
 function passes_1000(rows, j) {
-  const written = rows.map((row) => row[j] ?? ""), plain = written.filter((cell) => cell && !cell.includes(","));
-  return plain.length > 0 && plain.every((cell) => /^[+-]?\d{1,3}$/.test(cell)) && written.some((cell) => cell.includes(","));
+  const written = rows.map((row) => row[j] ?? "").filter((cell) => cell && isFinite(cell.replaceAll(",", "")));
+  const plain = written.filter((cell) => !cell.includes(","));
+  if (!plain.length || plain.length === written.length || !plain.every((cell) => /^[+-]?\d{1,3}$/.test(cell))) return false;
+  const [grouped, decimal] = ["", "."].map((mark) => written.map((cell) => +cell.replaceAll(",", mark)).reduce(
+    (most, value, i, all) => (i ? Math.max(most, Math.abs(value - all[i - 1])) : most), 0));
+  return grouped < decimal;
 }
 
 /** Names, units and rows of texts of a CSV; what a comma in a number stands for, null where it is an error. */

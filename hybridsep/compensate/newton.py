@@ -223,7 +223,7 @@ def slopes_of(
         of_position += [(turns * np.cos(angle))[:, None], (-turns * np.sin(angle))[:, None]]
     of_velocity = np.empty((len(x), 0))
     if static.own:
-        step, half = velocity_scale * static.discrete.T_s, half or _OWN_REACH * velocity_scale
+        step, half = velocity_scale * static.discrete.T_s, max(half, _OWN_REACH * velocity_scale)
         of_position.append(
             (static.own_at(start + (x + step), v_d) - static.own_at(start + (x - step), v_d)) / (2.0 * step)
         )
@@ -251,10 +251,10 @@ the bounds: from that of ``EXACT`` a plan within limits that its command just ke
 window.
 """
 
-FIRST_REACH, _REACH = 0.1, 0.5
+FIRST_REACH, _LEAST_REACH, _REACH = 0.1, 0.03, 0.5
 """Half of the change of velocity that friction's slope is taken over: relative to the model's velocity scale, in the
-first step of a run; after it relative to what the last step has changed of the velocity, or would have (RMS). A slope
-over less is blind to a sign that changes nearby, and no way down; one over more sees signs that stay."""
+first step of a run and at least; and relative to what the last step has changed of the velocity, or would have (RMS). A
+slope over less is blind to a sign that changes nearby, and no way down; one over more sees signs that stay."""
 
 TWICE = 15
 """Samples that a plan has from which on it makes two Newton steps: in windows of 50, a quarter of the preview, one
@@ -320,7 +320,7 @@ class AveragedPlanner:
         if found is None:
             return start, reach
         change = found - start.coefficients
-        reach = _REACH * self.model.speed(self.basis.values @ change)
+        reach = max(_LEAST_REACH, _REACH * self.model.speed(self.basis.values @ change))
         for length in _LENGTHS:
             end = self.point(start.coefficients + length * change)
             if is_better(end.cost, start.cost):

@@ -198,9 +198,7 @@ class LookAheads:
     off: float  # RMS of the error without compensation, m
     duration: float  # of the stretch, s
     T_s: float
-    # whether the command's own jerk is above its limit, as where it is rounded: plans that go on behind a short
-    # look-ahead may run away then
-    is_rough: bool = False
+    is_rough: bool = False  # whether the command's own jerk is above its limit: plans behind a preview may run away
 
     def figures(self, shown: DisplayUnits) -> tuple[str, list[str], list[list[str]]]:
         """Return title, head and rows of a table."""
@@ -466,8 +464,7 @@ class Stretch:
             found = self.expected(settings, Np)
             bound = limits_that_bind(found.x_d, found.x_dm, known.T_s, own)
             tried.append(Ahead(preview, rms(found.compensated), bound))
-        jerk = largest(np.diff(found.x_d, 3)) / known.T_s**3
-        is_rough = own.limits is not None and jerk > own.limits.jerk
+        is_rough = own.limits is not None and largest(np.diff(found.x_d, 3)) > own.limits.jerk * known.T_s**3
         return LookAheads(tuple(tried), chosen, self.off, len(found.x_d) * known.T_s, known.T_s, is_rough)
 
 

@@ -7,7 +7,7 @@ so where a modified command turns elsewhere.
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -66,13 +66,11 @@ class Trial:
         """Give a machine's trial; by the library where this machine has no compiled one ready that it can load."""
         with TemporaryDirectory() as folder:
             fmu = None
-            try:
+            with suppress(FmuError, OSError):  # the disk's, too
                 if kept(("SepCompensator", host_target())) is not None:
-                    fmu = build_here(machine, "SepCompensator", Path(folder))
-                    with FmuController(fmu, {}):
-                        pass
-            except FmuError:
-                fmu = None
+                    built = build_here(machine, "SepCompensator", Path(folder))
+                    with FmuController(built, {}):
+                        fmu = built
             yield cls(machine, fmu)
 
     @one_blas_thread

@@ -5,6 +5,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -330,7 +331,7 @@ def fit(
     settings_to_try(default, p)  # which refuses what does not fit into the window
     ahead = None
     if look_ahead is not None:
-        if not (isinstance(look_ahead, int | float) and 0.0 < look_ahead < math.inf):
+        if not isinstance(look_ahead, Real) or isinstance(look_ahead, bool) or not 0.0 < look_ahead < math.inf:
             raise ParameterError(f"look_ahead must be a time, s, got {look_ahead!r}")
         label = f"look_ahead = {look_ahead:g} s, in samples of {T_s:g} s,"
         ahead = PARAMETERS["preview"].checked(round(look_ahead / T_s), label)

@@ -16,8 +16,6 @@ from .source import ArraysSource, past_midnights
 from .text import with_own_names
 from .units import TIME_UNITS
 
-_SORTED = 0.01  # share of rows that an index may go back at; tables that were joined begin anew
-
 _OWN = (TypeError, AttributeError, LookupError)  # errors whose messages tell of the library's own names
 
 
@@ -122,7 +120,7 @@ class TableSource(_GivenSource):
         if labels.dtype.kind in "iu" and not known_names("t", [name]):
             steps = np.diff(labels.astype(np.int64))
             usual = float(np.median(steps))
-            if np.mean(steps < 0) > _SORTED:
+            if np.mean(steps < 0) > 0.01:  # tables that were joined begin anew
                 raise LogError(f"{self.path}: the index runs backwards; sort_index() puts the rows in their order")
             if usual == 0.0 or (steps == usual).all():
                 return

@@ -11,6 +11,7 @@ from ..base.errors import LogError, brief, listed
 from .names import ROLES, axes_of, known_names, signals_of
 from .source import Block, Source, sample_number
 from .text import is_number, stamp_kind
+from .times import COUNTED
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
 _COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "pulse", "pulses")
@@ -50,8 +51,12 @@ def choose_columns(
     time = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
     if time is None and "t" not in given:
         time = _only_clock(source)
-        if time is None and not time_needed:
-            time = _row_labels(source)
+        if time is not None and not time_needed and not _counts(source, time, clock=True):
+            time = None  # that of an export
+        if time is not None:
+            remarks = [*remarks, f"column {brief(time)} is read as the time; columns (--t) names another"]
+        elif not time_needed:
+            time = next((name for name in _ROW_LABELS if name in source.names and _counts(source, name)), None)
     if time is not None or "t" in given or time_needed:
         chosen = {"t": time, **chosen}
     source.remarks = [*source.remarks, *remarks]
@@ -155,20 +160,17 @@ def _only_clock(source: Source) -> str | None:
     """Return the only column of timestamps, whatever its name; None if there are none or several."""
     twins = {twin for one in source.twins.values() for twin in one}
     clocks = [name for name in source.names if name in source.stamps and name not in twins]
-    if len(clocks) != 1:
-        return None
-    source.remarks = [*source.remarks, f"column {brief(clocks[0])} is read as the time; columns (--t) names another"]
-    return clocks[0]
+    return clocks[0] if len(clocks) == 1 else None
 
 
-def _row_labels(source: Source) -> str | None:
-    """Return the column that counts rows, as pandas writes its index; None without one, or where it is no number."""
-    for name in {*source.names} & {*_ROW_LABELS}:
-        with suppress(LogError):
-            (labels,) = source.read([name]).columns
-            if (np.diff(labels) > 0.0).all() and (labels % 1.0 == 0.0).all():
-                return name
-    return None
+def _counts(source: Source, name: str, *, clock: bool = False) -> bool:
+    """Return whether a column counts rows, as pandas writes its index; or of a ``clock`` whether it ever increases."""
+    with suppress(LogError):
+        steps = np.diff(source.read([name]).columns[0])
+        if clock:
+            return bool((steps > 0.0).any())
+        return len(steps) >= COUNTED and bool((steps >= 1.0).all()) and float(np.median(steps)) == 1.0
+    return False
 
 
 def _check_names(source: Source) -> None:

@@ -418,9 +418,13 @@ def _comma(columns: Sequence[Sequence[str]]) -> str | None:
 
 
 def _passes_1000(column: Sequence[str]) -> bool:
-    """Return whether whole numbers below 1000 have no comma, and others one: no decimals come and go so."""
-    plain = [text for text in column if "," not in text]
-    return 0 < len(plain) < len(column) and all(map(_BELOW_1000.fullmatch, plain))
+    """Return whether whole numbers below 1000 have no comma, and others one, and its steps are smaller so."""
+    written = [text for text in column if not _MISSING.fullmatch(text)]
+    plain = [text for text in written if "," not in text]
+    if not 0 < len(plain) < len(written) or not all(map(_BELOW_1000.fullmatch, plain)):
+        return False
+    grouped, decimal = ([float(text.replace(",", mark)) for text in written] for mark in ("", "."))
+    return max(abs(b - a) for a, b in pairwise(grouped)) < max(abs(b - a) for a, b in pairwise(decimal))
 
 
 def _are_row_names(cells: Sequence[str]) -> bool:

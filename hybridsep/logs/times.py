@@ -16,7 +16,7 @@ _CLOCKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": _D
 """Units, s, that a column of times may be in which states none and is not in seconds."""
 
 _PLAUSIBLE = (2e-6, 0.5)  # intervals, s, of a log of an axis; beyond, a unit of times that is not stated is unknown
-_COUNTED = 10  # fewest times whose unit is doubted: two or three seconds are no index yet
+COUNTED = 10  # fewest times whose unit is doubted: two or three seconds are no index yet
 
 NOT_LATER = 0.05  # share of times not above the one before from which they are too coarse to tell an interval or a gap
 _RESOLVED = 0.2  # largest resolution of times of single precision, in intervals, with which they tell a gap
@@ -72,7 +72,7 @@ def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated
     if coarse or np.mean(steps <= 0.0) > NOT_LATER:
         return _rows(path, name, t, given, remarks)
     interval, error = _mean_interval(t)
-    told = stated or len(t) < _COUNTED
+    told = stated or len(t) < COUNTED
     counts = not told and float(np.median(steps)) == 1.0
     if given is None:
         if counts or not (told or _PLAUSIBLE[0] <= interval <= _PLAUSIBLE[1]):

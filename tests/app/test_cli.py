@@ -151,6 +151,9 @@ def test_weights_for_a_compensator(hybridsep: Run, tmp_path: Path) -> None:
     out = hybridsep.done("cosim", "--compensate", "hybrid", "--trajectory", command, "--weights", weights, "--json")
     assert json.loads(out)["tracking_rms_um"] < 2.5
     assert json.loads(out)["share_hybrid"] == 1.0
+    tight = ("--set", "drive_limits.jerk=300", "--json")
+    out = hybridsep.done("cosim", "--compensate", "physics", "--trajectory", command, "--weights", weights, *tight)
+    assert json.loads(out)["limit_costs"] is not None
 
 
 def test_help_lists_the_commands_in_whole_sentences(hybridsep: Run) -> None:

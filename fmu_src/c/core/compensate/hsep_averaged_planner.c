@@ -311,7 +311,8 @@ static hsep_real averaged_planner_next_reach(hsep_averaged_planner *self, const 
         squares += (delta - last) * (delta - last);
         last = delta;
     }
-    return scale > 0.0 ? HSEP_NEWTON_REACH * hsep_sqrt(squares / (hsep_real)self->preview) / scale : 0.0;
+    const hsep_real speed = scale > 0.0 ? hsep_sqrt(squares / (hsep_real)self->preview) / scale : 0.0;
+    return hsep_fmax(HSEP_NEWTON_LEAST_REACH, HSEP_NEWTON_REACH * speed);
 }
 
 /* Judge a length of a step, whose end the planner has, and take it if it is better; otherwise a shorter one is tried.
