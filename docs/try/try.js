@@ -45,7 +45,7 @@ function split(line, separator) {
   return cells.map((cell) => cell.replace(new RegExp(`${separator}$`), "").trim().replace(/^["'](.*)["']$/, "$1").trim());
 }
 
-/** Whether whole numbers below 1000 have no comma in a column, and others one, and its steps are smaller so. */
+/** Whether only whole numbers below 1000 of a column lack a comma, and neighbours are closer if it is of thousands. */
 function passes_1000(rows, j) {
   const written = rows.map((row) => row[j] ?? "").filter((cell) => cell && isFinite(cell.replaceAll(",", "")));
   const plain = written.filter((cell) => !cell.includes(","));

@@ -157,8 +157,10 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
                 there = sorted(path.name for path in (folder / "binaries").glob("*") if path.is_dir())
                 raise FmuError(f"{place} is missing, there are binaries for {listed(there, str)}")
             with _working_directory():
-                names = {"modelIdentifier": identifier, "instanceName": instance_name}
-                slave = version.slave(guid=self.description.guid, unzipDirectory=str(folder), **names)
+                guid, unpacked = self.description.guid, str(folder)
+                slave = version.slave(
+                    guid=guid, unzipDirectory=unpacked, modelIdentifier=identifier, instanceName=instance_name
+                )
         except Exception as error:  # fmpy raises bare Exceptions here
             if isinstance(error, OSError) and error.filename is not None:  # the disk's, with a name
                 raise

@@ -195,8 +195,9 @@ class Report:
         from plotly.io import to_html
 
         self._n_charts += 1
-        how = {"full_html": False, "include_plotlyjs": self._n_charts == 1, "div_id": f"chart{self._n_charts}"}
-        drawn = to_html(chart.figure(), {"responsive": True, "displayModeBar": False}, **how)
+        look, is_first = {"responsive": True, "displayModeBar": False}, self._n_charts == 1
+        div_id = f"chart{self._n_charts}"
+        drawn = to_html(chart.figure(), look, full_html=False, include_plotlyjs=is_first, div_id=div_id)
         caption = f"<figcaption>{html.escape(chart.caption)}</figcaption>" if chart.caption else ""
         self._parts.append(f"<figure>{drawn}{caption}</figure>")
 

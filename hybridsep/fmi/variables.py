@@ -194,8 +194,6 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
     prediction = "prediction for now under x_dm, with averaging by its model, else by the model that planned the window"
     error = "predicted servo error x_d - x_h that is left"
     state = "model that planned what x_dm follows now"
-    meanings = (*_COMPENSATE.meanings, "none: the change of the command fades until a reset")
-    states: dict[str, Any] = {"items": (*_COMPENSATE.choices, "tripped"), "item_meanings": meanings}
     return [
         _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
         _position("x_meas", "input", "measured position now", start=0.0),
@@ -205,7 +203,12 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
         _position("x_h", "output", prediction, initially_from=plan),
         _position("x_h_std", "output", _STD, display_unit="um", initially_from=(*plan, "lambda", "noise_std")),
         _position("e_servo", "output", error, display_unit="um", initially_from=plan),
-        Variable("sep_state", "Enumeration", "output", "discrete", state, initially_from=model, **states),
+        Variable(
+            *("sep_state", "Enumeration", "output", "discrete", state),
+            initially_from=model,
+            items=(*_COMPENSATE.choices, "tripped"),
+            item_meanings=(*_COMPENSATE.meanings, "none: the change of the command fades until a reset"),
+        ),
         _position("rms_e", "output", "running RMS of x_d - x_meas since t_init", display_unit="um"),
         *_RUNNING_ERRORS,
         Variable("batch", "Integer", "output", "discrete", "number of the window, floor(k / Np)"),

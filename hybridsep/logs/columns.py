@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import LogError, brief, listed
+from ..base.signals import Array
 from .names import ROLES, axes_of, known_names, signals_of
 from .source import Block, Source, sample_number
 from .text import is_number, stamp_kind
@@ -51,12 +52,12 @@ def choose_columns(
     time = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
     if time is None and "t" not in given:
         time = _only_clock(source)
-        if time is not None and not time_needed and not _counts(source, time, clock=True):
+        if time is not None and not time_needed and not (_steps(source, time) > 0.0).any():
             time = None  # that of an export
         if time is not None:
             remarks = [*remarks, f"column {brief(time)} is read as the time; columns (--t) names another"]
         elif not time_needed:
-            time = next((name for name in _ROW_LABELS if name in source.names and _counts(source, name)), None)
+            time = _row_labels(source)
     if time is not None or "t" in given or time_needed:
         chosen = {"t": time, **chosen}
     source.remarks = [*source.remarks, *remarks]
@@ -163,14 +164,20 @@ def _only_clock(source: Source) -> str | None:
     return clocks[0] if len(clocks) == 1 else None
 
 
-def _counts(source: Source, name: str, *, clock: bool = False) -> bool:
-    """Return whether a column counts rows, as pandas writes its index; or of a ``clock`` whether it ever increases."""
+def _steps(source: Source, name: str) -> Array:
+    """Return the differences of a column, ``(n - 1,)``, none where it does not hold numbers."""
     with suppress(LogError):
-        steps = np.diff(source.read([name]).columns[0])
-        if clock:
-            return bool((steps > 0.0).any())
-        return len(steps) >= COUNTED and bool((steps >= 1.0).all()) and float(np.median(steps)) == 1.0
-    return False
+        return np.diff(source.read([name]).columns[0])
+    return np.empty(0)
+
+
+def _row_labels(source: Source) -> str | None:
+    """Return the column that counts rows, as pandas writes its index; None without one."""
+    for name in filter(source.names.__contains__, _ROW_LABELS):
+        steps = _steps(source, name)
+        if len(steps) >= COUNTED and (steps >= 1.0).all() and np.median(steps) == 1.0:
+            return name
+    return None
 
 
 def _check_names(source: Source) -> None:

@@ -418,7 +418,7 @@ def _comma(columns: Sequence[Sequence[str]]) -> str | None:
 
 
 def _passes_1000(column: Sequence[str]) -> bool:
-    """Return whether whole numbers below 1000 have no comma, and others one, and its steps are smaller so."""
+    """Return whether only whole numbers below 1000 lack a comma, and neighbours are closer if it is of thousands."""
     written = [text for text in column if not _MISSING.fullmatch(text)]
     plain = [text for text in written if "," not in text]
     if not 0 < len(plain) < len(written) or not all(map(_BELOW_1000.fullmatch, plain)):
