@@ -112,7 +112,7 @@ class Fit:
     offset: float  # mean of the segments' offsets, m
     rms: float  # root mean square of the residual, m
     slowest: float  # lower bound of the natural frequencies, rad/s
-    at_bound: bool  # whether a nonlinear parameter is at the end of its range
+    at_bound: bool  # whether a nonlinear parameter is at the end of its range, but for a lag that acts at once
 
 
 class _Problem:
@@ -207,8 +207,8 @@ def fit_structure(
         residual, linear, offset = problem.solve(theta)
         rms = float(np.sqrt(np.mean(residual**2)))
         if best is None or rms < best.rms:
-            at_bound = bool(np.any((theta < low + _EDGE) | (theta > high - _EDGE)))
-            best = Fit(structure, delay, theta, linear, offset, rms, slowest, at_bound)
+            at_end = (theta < low + _EDGE) | (theta > high - _EDGE) & (np.arange(len(theta)) < 2 * structure.n_modes)
+            best = Fit(structure, delay, theta, linear, offset, rms, slowest, bool(at_end.any()))
     assert best is not None  # there is a start
     return best
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.signals import Array
 from .output_error import Delay, Fit, Segment, fit_structure
-from .structure import RATES_MIN, SLOWEST, Structure
+from .structure import RATES_MIN, Structure
 from .uncertainty import estimates
 
 _CONTRADICTED = 4.0  # ratio of likelihoods, twice its logarithm, that contradicts: two standard deviations
@@ -21,8 +21,6 @@ def fit_delay(segments: Sequence[Segment], T_s: float, structure: Structure, kno
     cache: dict[int, Fit] = {}
     rate = _bandwidth(segments, T_s, known)
     starts = _starts(structure, known, T_s, rate)
-    if structure.order > 1:
-        slowest = max(slowest, SLOWEST * rate)
 
     def at(halves: int) -> Fit:
         if halves not in cache:
@@ -96,12 +94,13 @@ def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, ra
     if structure.n_modes == 1 and not structure.lag:
         return [np.log([factor * rate, zeta]) for factor, zeta in ((1.0, 0.5), (2.0, 0.9), (4.0, 0.3))]
     n_modes = structure.n_modes - (not structure.lag)
-    bases = [fit for other, fit in known.items() if other.n_modes == n_modes and not other.lag]
+    bases = [fit for other, fit in known.items() if other.n_modes == n_modes and other.lag <= (not structure.lag)]
     if not bases:
         return []
-    base = min(bases, key=lambda fit: fit.rms).theta
+    base = min(bases, key=lambda fit: fit.rms).theta[: 2 * n_modes]
     if structure.lag:
-        return [np.append(base, np.log(factor * rate)) for factor in (0.5, 3.0)]
+        slow = np.log([0.03 * rate, 0.7, 3.0 * rate])  # integrators beside a fast loop, or a feed-forward
+        return [*(np.append(base, np.log(factor * rate)) for factor in (0.5, 3.0)), slow]
     fastest = 0.5 * np.pi / T_s
     added = np.exp(np.linspace(np.log(rate), np.log(fastest), 6)[1:]) if fastest > rate else [fastest]
     return [np.concatenate((base, np.log([omega, 0.1]))) for omega in added]

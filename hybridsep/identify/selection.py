@@ -72,6 +72,8 @@ it is 6.6."""
 _SPREAD_MAX = 0.5
 """Largest relative standard deviation of a natural frequency where a structure has several poles to place."""
 
+_AT_ONCE = 0.2  # time constant of a lag, samples, below which it is a part that follows at once, whatever it is
+
 _FITTED_BETTER = 0.7
 """Ratio of the fitted errors at which a larger structure is taken though the held-out errors are alike: most of the
 held-out error may be what no structure explains, such as a first reversal."""
@@ -141,7 +143,7 @@ def compare_structures(
         residual = _held_out_error(fit, split, T_s)
         found.append((fit, residual, _objection(fit, split, T_s)))
         rms = float(np.std(residual))
-        if not found[-1][2] and rms < best * (1 - TOLERANCE):
+        if rms < best * (1 - TOLERANCE):  # objections too: it may take a pole more
             best, best_order, white = rms, structure.order, _is_white(residual)
     offsets = [fit.offset for fit, _, _ in found if fit.structure.order] or [found[0][0].offset]
     common = float(np.median(offsets))
@@ -271,7 +273,9 @@ def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:
         return "a pole slower than the recording shows"
     if structure.order > 2:
         fitted = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in segments if s.known[: s.stop].sum() > 1]
-        spreads = [e.std / e.value for e in estimates(fit, fitted, T_s)[0] if e.name.endswith(("f_n", "tau"))]
+        at_once = structure.lag and fit.theta[-1] > -np.log(_AT_ONCE * T_s)
+        poles = "f_n" if at_once else ("f_n", "tau")
+        spreads = [e.std / e.value for e in estimates(fit, fitted, T_s)[0] if e.name.endswith(poles)]
         if max(spreads) > _SPREAD_MAX:
             return "poles that the recording does not determine"
     return ""

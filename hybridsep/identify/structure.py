@@ -15,9 +15,6 @@ from ..model.physics import Mode
 _ZETA_RANGE = (0.003, 5.0)
 """Damping ratios that are tried; Table 1 has 0.007, and at 5 the two poles are a factor of 98 apart."""
 
-SLOWEST = 0.1
-"""Slowest pole in multiples of the bandwidth: friction and the like, which are not linear, look like slower ones."""
-
 FASTEST = 0.25
 """Highest natural frequency in multiples of the sampling frequency: with fewer than four samples a period a log does
 not resolve a mode, and its replay is refused."""

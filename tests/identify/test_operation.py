@@ -188,11 +188,23 @@ def test_friction_is_no_slow_part_of_the_model() -> None:
     assert refused[0].startswith("zeros all but cancel a slow part of 0.")
 
 
-def test_slow_parts_that_cancel() -> None:
-    def mode(f_n: float, zeta: float, gain: float, beta: float = 0.0) -> Mode:
-        omega = 2 * np.pi * f_n
-        return Mode(f_n, zeta, gain * omega**2, beta * omega)
+def mode(f_n: float, zeta: float, gain: float, beta: float = 0.0) -> Mode:
+    omega = 2 * np.pi * f_n
+    return Mode(f_n, zeta, gain * omega**2, beta * omega)
 
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("f_n", "gain"), [(1.0, 0.05), (2.0, 0.1)])
+def test_a_slow_part_beside_a_fast_loop_is_found(f_n: float, gain: float) -> None:
+    """Feed-forward beside a slow integrator: a lag, or a mode that rings, left six tenths of the servo error."""
+    x_d, truth = moves(8000), ModalModel([mode(60.0, 0.6, 1.0 - gain, 1.1), mode(f_n, 1.0, gain)], dead_time=1)
+    x = measured(truth, rubbed(x_d, 20e-6), "foh", 5e-7)
+    found = identify_operation([(x_d, x)], T_S)
+    assert found.rms < 0.15 * np.std(x - x_d)
+    assert min(one.f_n for one in found.model.modes) == pytest.approx(f_n, rel=0.25)
+
+
+def test_slow_parts_that_cancel() -> None:
     assert slow_parts([mode(35.0, 0.3, 0.96), mode(3.0, 0.7, 0.04)]) == [3.0]
     assert slow_parts([mode(35.0, 0.3, 0.6), mode(3.0, 0.7, 0.4)]) == []
     assert slow_parts([mode(35.0, 0.3, 1.0), mode(3.0, 0.7, 0.0, 0.5)]) == []  # a resonance of its own
