@@ -66,7 +66,6 @@ class SepCompensator:
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         Np = predictor.Np
         predictor.settings.check_planning()
-        predictor.plan_ahead()
         self.predictor = predictor
         look_ahead = predictor.model.look_ahead(predictor.T_s, predictor.settings.input_hold)
         self.settings = settings = (settings or CompensatorSettings()).for_window(Np, look_ahead)
@@ -74,6 +73,7 @@ class SepCompensator:
         assert settings.spacing is not None
         assert settings.horizon is not None
         self.preview, self.spacing, self.horizon = settings.preview, settings.spacing, settings.horizon
+        predictor.plan_ahead(self.preview)
         self._basis = SplineBasis(self.horizon, self.spacing, Np)
         bounds = self._bounds(settings)
         self._planning: Planning

@@ -58,7 +58,7 @@ class PaperModel:
         """Return the model at the beginning of another run, at rest; what was learned is kept."""
         return replace(self, x_pb=np.zeros_like(self.x_pb), e_pb=np.zeros_like(self.e_pb))
 
-    def plan_ahead(self) -> PaperModel:
+    def plan_ahead(self, preview: int) -> PaperModel:
         """Return the model where a compensator decides the commands: the same."""
         return self
 

@@ -69,8 +69,8 @@ class HybridPredictor:
 
     Attributes
     ----------
-    planned : bool
-        Whether a compensator decides the commands.
+    planned : int
+        Samples of the command that a compensator, which decides it, knows ahead; 0 without one.
     state : PredictorState
     pending : PredictedWindow, optional
         The predicted window, until it is measured.
@@ -91,7 +91,7 @@ class HybridPredictor:
     ) -> None:
         self.settings = settings = PredictorSettings() if settings is None else settings
         self.Np, self.T_s = settings.Np, settings.T_s
-        self.model, self.disturbances, self.planned = model, tuple(disturbances), False
+        self.model, self.disturbances, self.planned = model, tuple(disturbances), 0
         self.discrete = model.discretise(self.T_s, settings.input_hold, block=self.Np)
         if self.disturbances and not settings.averaging:
             raise ParameterError("disturbances are learned with averaging = true only")
@@ -125,10 +125,10 @@ class HybridPredictor:
         self.state = PredictorState(0, n_init, rest, physics, late, residual, self.state.uncertainty)
         self.pending: PredictedWindow | None = None
 
-    def plan_ahead(self) -> None:
-        """Adapt to a compensator, which moves the drive as it commands, from rest."""
-        self.planned = True
-        self.state = replace(self.state, residual=self.residual.plan_ahead())
+    def plan_ahead(self, preview: int) -> None:
+        """Adapt to a compensator, which moves the drive as it commands, from rest, ``preview`` samples ahead."""
+        self.planned = preview
+        self.state = replace(self.state, residual=self.residual.plan_ahead(preview))
 
     @property
     def learned_with(self) -> dict[str, float]:
@@ -332,7 +332,7 @@ class HybridPredictor:
             "settings": asdict(self.settings),
             "dead_time": self.model.dead_time,
             "n_disturbances": len(self.disturbances),
-            "planned": self.planned,
+            "preview": self.planned,
             "pending_start": None,
         }
         modes = [[mode.f_n, mode.zeta, mode.alpha, mode.beta] for mode in self.model.modes]
@@ -362,8 +362,8 @@ class HybridPredictor:
                 )
             model = ModalModel([Mode(*row) for row in arrays["modes"].tolist()], meta["dead_time"])
             predictor = cls(model, PredictorSettings.from_table(meta["settings"]), disturbances=disturbances)
-            if meta["planned"]:
-                predictor.plan_ahead()
+            if meta["preview"]:
+                predictor.plan_ahead(meta["preview"])
             predictor.state = restored(predictor.state, arrays)
             if (start := meta["pending_start"]) is not None:
                 scales = None

@@ -199,8 +199,11 @@ def test_every_parameter_compensates_as_in_the_library(new_stream: StreamMaker, 
 
 
 @on_all((COMPENSATOR,), needs="agreement")
-def test_the_physics_models_plans_turn_as_in_the_library(new_stream: StreamMaker) -> None:
-    assert_agreement(new_stream, 500, {"compensate": 1, "spacing": 5}, 1e-9, path="spiral")
+@pytest.mark.parametrize(
+    "values", [{"compensate": 1, "spacing": 5}, LONGER | {"preview": 150}], ids=("physics turns", "longer recalls")
+)
+def test_the_spiral_is_compensated_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
+    assert_agreement(new_stream, 500, values, 1e-11, path="spiral")
 
 
 def at_rest_first(k: int, x_meas: float, last: float) -> float:

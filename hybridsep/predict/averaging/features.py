@@ -109,9 +109,9 @@ class StaticFeatures:
     q: int  # largest lag of ``x_pb``, as that many differences, at most three
     period: float = 0.0  # m: of a disturbance that repeats with the position; 0: none
     own: tuple[Disturbance, ...] = ()  # the user's own
-    # whether a compensator decides the commands: then the position's own velocity is damped, as ``x_pb`` turns with
-    # every change of the command, and is far from the motion; else the velocity of ``x_pb``
-    is_planned: bool = False
+    # behind a compensator: commands that are known from the last measured one on, of a path that may go on. The
+    # position's own velocity is damped then, as ``x_pb`` turns with every change of the command, else that of ``x_pb``
+    n_known: int | None = None
 
     @property
     def n_differences(self) -> int:
@@ -180,7 +180,7 @@ class StaticFeatures:
     def damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
         """Return the velocity of the damping over a window, ``(n,)``, m/s."""
         v = np.diff(x_pb, prepend=state.x_pb[-1])
-        if self.is_planned:
+        if self.n_known:
             e = x - x_pb
             v = v + np.diff(e, prepend=e[:1])
         return np.asarray(v / self.discrete.T_s)
@@ -219,7 +219,7 @@ class StaticFeatures:
 
         Columns: 1; ``x_pb`` and its differences; the filtered disturbances; their first differences.
 
-        ``x``, (n,), m: position that the stiffness acts at, and whose velocity is damped with ``is_planned``;
+        ``x``, (n,), m: position that the stiffness acts at, and whose velocity is damped with ``n_known``;
         ``velocity_scale``: velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
         SignalError if a disturbance of the user's own does not return a finite number for each sample.
         """

@@ -219,9 +219,9 @@ class AveragedModel:
         state = replace(self, learned=learned, evidence=evidence, leader=leading.place, run=run)
         return state.with_noise(learned)
 
-    def plan_ahead(self) -> AveragedModel:
-        """Return the model where a compensator decides the commands."""
-        return replace(self, static=replace(self.static, is_planned=True))
+    def plan_ahead(self, preview: int) -> AveragedModel:
+        """Return the model where a compensator decides the commands, and knows so many samples ahead."""
+        return replace(self, static=replace(self.static, n_known=self.settings.n_late + preview))
 
     def for_plans(self) -> AveragedModel:
         """Return the model with the weights that plans weigh its experts by."""
@@ -246,7 +246,7 @@ class AveragedModel:
         n_windows = self.evidence[MODEL_RESIDUAL].earlier.n_rows / settings.Np
         outgrown = peak > max(CONSTANTS.velocity_jump * max(n_windows, 1.0) * before, LEAST_VELOCITY)
         step = max(learned.largest_step, peak * settings.T_s)
-        if static.is_planned and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
+        if static.n_known and self.evidence[MODEL_RESIDUAL].n_rows == 0.0:
             peak = max(static.peak_velocity(window.raw_commands[settings.n_late :], window.start), before)
             outgrown = peak > max(before, LEAST_VELOCITY)
         velocity = peak if outgrown else before
@@ -273,9 +273,9 @@ class AveragedModel:
         ``like``: under other commands, with the same path: its shrinking is held; ``counts``, (n,): as
         :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
         """
-        x, held = window.x_pb, {} if like is None else like.predictions
-        memory = self.run.memory.append_commands(window.raw_commands, self.settings.Np) if like is None else like.memory
-        recalled = memory.recalled(len(window.raw_commands))
+        x, path, held = window.x_pb, window.raw_commands, like.predictions if like else {}
+        memory = like.memory if like else self.run.memory.append_commands(path[: self.static.n_known], self.settings.Np)
+        recalled = memory.recalled(len(path))
         rows, _ = self.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, rows, {}, recalled)
         if STATIC in solved:
