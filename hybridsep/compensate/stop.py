@@ -43,12 +43,12 @@ class Stop:
         self.rows = bounds.rows_of(basis.acting(preview, -(-preview // basis.spacing)))
         self.n = self.rows.shape[1]  # coefficients, the decided ones first
         shared, last = N_DECIDED + self.n_shared, N_DECIDED + (preview - PLAN_END) // basis.spacing - 2
-        held = np.eye(last)[np.minimum(np.arange(self.n + 3), last - 1)]  # from the last one on all are alike
+        held, steps = np.tri(self.n + 3, last), np.diff(np.eye(shared), 1, 0, 0.0)  # by steps: well conditioned
         # The least sum of squares of the differences of orders 1 to 3, in limits, behind what is shared
         weights = enumerate(bounds.shares(basis.spacing), start=1)
         least = np.concatenate([share * np.diff(held, order, axis=0)[shared - order :] for order, share in weights])
-        tail = -np.linalg.lstsq(least[:, shared:], least[:, :shared], rcond=None)[0]
-        self._stopping: Array = held[: self.n] @ np.concatenate((np.eye(shared), tail))
+        tail = -np.linalg.lstsq(least[:, shared:], least[:, :shared] @ steps, rcond=None)[0]
+        self._stopping: Array = np.cumsum(np.vstack((steps, tail)), axis=0)[np.minimum(np.arange(self.n), last - 1)]
 
     def carried_out(self, plan: Array, old: Array, low: Array, high: Array) -> tuple[Array, Array]:
         """Return what of a plan may be carried out, and its stop: coefficients, m, the decided ones first.
