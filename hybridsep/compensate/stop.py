@@ -8,8 +8,6 @@ command to a constant within the known preview. A constant change takes nothing 
 follows. A plan is carried out as far as it has a stop within the limits; otherwise the last stop goes on.
 """
 
-import math
-
 import numpy as np
 
 from ..base.settings import PLAN_END
@@ -21,9 +19,6 @@ _TRIES = 12
 """Lengths of the way from the last stop to a plan that are tried, all of it first, to a two-thousandth. With 0.8 of the
 last one each time, and none where eight fail, an axis with 50 ms of look-ahead stood 6 mm off: the next window asked
 for the same (``docs/experiments/2026-11-29-stops-by-bisection.md``)."""
-
-_FADE = 10.0
-"""Time constants, in a horizon, with which the change fades behind a plan that has no stop."""
 
 _STILL, _NOTHING = 1e-12, 1e-6
 """Row of the last stop's own part, in limits, below which that part does not matter there; and largest row up to which
@@ -38,7 +33,6 @@ class Stop:
     """
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, preview: int, Np: int, n_pinned: int) -> None:
-        self.spacing, self._horizon = basis.spacing, basis.preview
         self.n_shared = Np // basis.spacing + n_pinned
         self.rows = bounds.rows_of(basis.acting(preview, -(-preview // basis.spacing)))
         self.n = self.rows.shape[1]  # coefficients, the decided ones first
@@ -78,10 +72,10 @@ class Stop:
         stop = self._stopping @ shared + share * (old - self._stopping @ old[:n])
         if length == 1.0:
             return plan, stop
-        pole, c = math.exp(-_FADE * self.spacing / self._horizon), shared.tolist()
-        while len(c) < len(plan):  # behind what is shared the change fades
-            c.append(3.0 * pole * c[-1] - 3.0 * pole * pole * c[-2] + pole * pole * pole * c[-3])
-        return np.array(c), stop
+        # Behind what the next plan shares of it, too, the change fades, and ends with the plan
+        begin, end = n + self.n_shared, len(plan)
+        gone = np.maximum(np.arange(end) - begin, 0) / max(end - begin, 1)
+        return (1.0 - gone**3) ** 3 * stop[np.minimum(np.arange(end), self.n - 1)], stop
 
 
 def _share(rows: Array, own: Array, low: Array, high: Array) -> float | None:

@@ -294,7 +294,7 @@ def test_a_plan_without_a_stop_is_shortened_to_the_last_one_and_fades(speed: flo
     stop, bounds = stop_of(change_max=1e-2)
     n = N_DECIDED + stop.n_shared
     # A change that gathers half of the largest velocity
-    k = np.maximum(0.0, np.arange(N_DECIDED + 96) - N_DECIDED)
+    k = np.maximum(0.0, np.arange(N_DECIDED + 95) - N_DECIDED)
     plan = 0.5 * 0.2 * LIMITS.acceleration * (T_S * SPACING * k) ** 2
     step = speed * LIMITS.velocity * T_S
     ramp = step * np.arange(-2.0, PREVIEW + 1, dtype=np.float64)
@@ -309,6 +309,11 @@ def test_a_plan_without_a_stop_is_shortened_to_the_last_one_and_fades(speed: flo
     longest = length * np.min((np.where(rows > 0.0, high, low) / np.where(moves, rows, 1.0))[moves])
     assert longest - 2.0**-11 < length <= longest + 1e-8
     assert np.max(np.abs(carried[-5:])) < 0.1 * np.max(np.abs(carried))
+    # What is left of it has a stop in the next window, too
+    kept, delta = NP // SPACING, SplineBasis(HORIZON, SPACING, NP).values @ carried
+    left, old = np.pad(carried[kept:], (0, kept)), np.pad(found[kept:], (0, kept), mode="edge")
+    next_bounds = bounds.hard(command + NP * step, command[NP - 3 : NP], delta[NP - 3 : NP])
+    assert stop.carried_out(left, old, *next_bounds)[0] is left
 
 
 def test_the_last_stop_goes_on_where_nothing_of_a_plan_is_possible() -> None:

@@ -18,7 +18,6 @@ typedef struct {
     hsep_int shared;  /* splines that a stop has from its plan, those of a window and the next plan's pinned ones, */
     hsep_int n;       /* and those before all coefficients are alike */
     hsep_int count;   /* coefficients: the decided ones and those of all splines that begin in the preview */
-    hsep_real pole;   /* of a change that fades, from spline to spline */
     /* Offsets in words from the beginning of the struct */
     hsep_int last;  /* (count,) m, the last stop, */
     hsep_int own;   /* (count,) m, by which it differs from one that stops as these do, */
@@ -29,7 +28,7 @@ typedef struct {
     hsep_int start, way, own_rows; /* the last stop without its own part, the way to the plan's, and that part */
 } hsep_stop;
 
-HSEP_ASSERT_WORDS(hsep_stop, 14);
+HSEP_ASSERT_WORDS(hsep_stop, 13);
 
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters)
 {
@@ -120,7 +119,6 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameter
         const hsep_splines *splines = hsep_planner_splines(self);
         hsep_stop *stop = hsep_part(self, self->stop);
         (void)stop_lay_out(stop, parameters);
-        stop->pole = hsep_exp(-HSEP_STOP_FADE * (hsep_real)splines->spacing / (hsep_real)splines->preview);
         stop_gains(stop, splines);
     }
 }
@@ -572,14 +570,13 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
         last[i] += length * (plan[i] - last[i]);
     }
     stop_behind(self, last);
-    if (length < 1.0) { /* behind what is shared the change fades */
-        memcpy(plan, last, shared);
-        for (hsep_int i = first; i < HSEP_N_DECIDED + splines->n; i++) {
-            const hsep_real pole = self->pole;
-            plan[i] = 3.0 * pole * plan[i - 1] - 3.0 * pole * pole * plan[i - 2] + pole * pole * pole * plan[i - 3];
-        }
-    }
     hsep_axpy(last, share, own, self->count);
+    const hsep_int all = HSEP_N_DECIDED + splines->n, begin = first + self->shared;
+    for (hsep_int i = 0; i < all && length < 1.0; i++) { /* behind what the next plan shares of it the change fades */
+        const hsep_real gone = i > begin ? (hsep_real)(i - begin) / (hsep_real)(all - begin) : 0.0;
+        const hsep_real left = 1.0 - gone * gone * gone;
+        plan[i] = left * left * left * last[i < self->count ? i : self->count - 1];
+    }
 }
 
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
