@@ -3,9 +3,7 @@
 #include "hsep_check.h"
 #include "hsep_text.h"
 
-#include <math.h>
 #include <stdarg.h>
-#include <string.h>
 
 enum { CALLS_N_CATEGORIES = 5, CALLS_LOG_EVERYTHING = 31 };
 

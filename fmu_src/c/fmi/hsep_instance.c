@@ -2,8 +2,6 @@
 
 #include "hsep_check.h"
 
-#include <string.h>
-
 HSEP_API void *hsep_new(const hsep_instance *instance, size_t size)
 {
     void *block = instance->allocate(1, size);

@@ -10,9 +10,6 @@
 #include "hsep_fmu.h"
 #include "hsep_table.h"
 
-#include <stddef.h>
-#include <stdint.h>
-
 #define HSEP_N_PHASES 5
 
 /* The variable of a value reference: its row, its kind in this version, and the place and number of its values. */

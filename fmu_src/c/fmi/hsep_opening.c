@@ -5,9 +5,6 @@
 #include "hsep_crc.h"
 #include "hsep_resource.h"
 
-#include <math.h>
-#include <string.h>
-
 #ifdef HSEP_TABLE_IN_RESOURCES
 #ifdef HSEP_NO_FILES
 #error "the table of this FMU is in its resources, which HSEP_NO_FILES leaves out: take the header of a source FMU"

@@ -10,8 +10,6 @@
 
 #include "hsep_crc.h"
 
-#include <string.h>
-
 #define SAVED_VERSION 40U /* changes whenever the layout of any state does */
 #define SAVED_BYTE_ORDER 0x01020304U
 #define SAVED_MAGIC "HSEPFMI2"

@@ -4,7 +4,6 @@
 #include "hsep_windows.h"
 
 #include <limits.h>
-#include <string.h>
 
 static const char *const values_causalities[] = {
     "an input", "an output", "a parameter", "a calculated variable", "the independent variable"};

@@ -3,8 +3,6 @@
 
 #include "fmi2Functions.h"
 
-#include <math.h>
-
 /* The calls that belong to an instance: HSEP_LEGAL(function, states in which it is legal); the standard's table of the
  * co-simulation state machine.
  * I: instantiated, M: Initialization Mode, S: stepping, T: terminated */

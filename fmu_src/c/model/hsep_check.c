@@ -3,10 +3,7 @@
 #include "hsep_table.h"
 #include "hsep_text.h"
 
-#include <math.h>
 #include <stdarg.h>
-#include <stdint.h>
-#include <string.h>
 
 static const double check_position_max[] = {1e3, 1e6}; /* m; rad, as a rotary axis may turn on and on */
 

@@ -2,8 +2,6 @@
 
 #include "hsep_text.h"
 
-#include <string.h>
-
 /* The numbers of the modes are read in place. */
 HSEP_ASSERT(numbers_of_a_mode, sizeof(hsep_mode) == HSEP_MODE_NUMBERS * sizeof(double));
 

@@ -12,8 +12,6 @@
 #include "hsep_plant.h"
 #include "hsep_table.h"
 
-#include <math.h>
-
 #if defined(HSEP_MODEL_FEED_DRIVE)
 #define DRIVE(function) hsep_feed_drive_##function
 typedef hsep_feed_drive drive_plant;

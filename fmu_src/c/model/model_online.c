@@ -12,12 +12,8 @@
 #include "hsep_compensator.h"
 #include "hsep_learned.h"
 #include "hsep_parameters.h"
-#include "hsep_math.h"
 #include "hsep_table.h"
 #include "hsep_windows.h"
-
-#include <math.h>
-#include <string.h>
 
 #if defined(HSEP_MODEL_HYBRID_PREDICTOR)
 #define ONLINE(function) hsep_predictor_##function

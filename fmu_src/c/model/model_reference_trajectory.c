@@ -16,9 +16,7 @@
 #include "hsep_resource.h"
 #include "hsep_text.h"
 
-#include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #define TRAJECTORY_NAME_SIZE 32
 

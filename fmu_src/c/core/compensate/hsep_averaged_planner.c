@@ -1,10 +1,6 @@
 #include "hsep_averaged_planner.h"
 
 #include "hsep_cholesky.h"
-#include "hsep_math.h"
-#include "hsep_vector.h"
-
-#include <string.h>
 
 static const hsep_real averaged_planner_lengths[] = {HSEP_NEWTON_LENGTHS};
 static const hsep_tolerance averaged_planner_tolerance = {HSEP_NEWTON_TOLERANCE};

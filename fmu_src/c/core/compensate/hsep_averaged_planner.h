@@ -15,7 +15,6 @@
 #ifndef HSEP_AVERAGED_PLANNER_H
 #define HSEP_AVERAGED_PLANNER_H
 
-#include "hsep_layout.h"
 #include "hsep_linearised.h"
 #include "hsep_physics.h"
 #include "hsep_planner.h"

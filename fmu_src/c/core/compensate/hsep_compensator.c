@@ -1,9 +1,5 @@
 #include "hsep_compensator.h"
 
-#include "hsep_math.h"
-
-#include <string.h>
-
 static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};
 
 HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)

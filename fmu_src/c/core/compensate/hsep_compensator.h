@@ -24,7 +24,6 @@
 #define HSEP_COMPENSATOR_H
 
 #include "hsep.h"
-#include "hsep_layout.h"
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
 #include "hsep_averaged_planner.h"

@@ -1,10 +1,6 @@
 #include "hsep_interior.h"
 
 #include "hsep_cholesky.h"
-#include "hsep_math.h"
-#include "hsep_vector.h"
-
-#include <string.h>
 
 /* Slacks and multipliers of the bounds B x >= b, those of the low rows, then those of the high ones, as qp.py has them:
  * B = [A; -A], b = [low; -high]. A proximal term rho regularises the multipliers: ds = B dx + r_p + rho dz,

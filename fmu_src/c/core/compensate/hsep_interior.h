@@ -9,7 +9,6 @@
 #define HSEP_INTERIOR_H
 
 #include "hsep_knots.h"
-#include "hsep_layout.h"
 #include "hsep_splines.h"
 
 /* Where the solver ends. */

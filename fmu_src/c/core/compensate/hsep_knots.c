@@ -1,9 +1,5 @@
 #include "hsep_knots.h"
 
-#include "hsep_vector.h"
-
-#include <string.h>
-
 /* Cubic splines with knots 1, 2 and 4 spacings apart as sums of those 1 apart: the two-scale relation, once and twice.
  */
 static const hsep_real knots_shares[] = {1.0,      0.125,   0.5,     0.75,     0.5,     0.125,  0.015625,

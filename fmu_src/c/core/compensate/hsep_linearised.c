@@ -1,10 +1,6 @@
 #include "hsep_linearised.h"
 
-#include "hsep_math.h"
 #include "hsep_plan_constants.h"
-#include "hsep_vector.h"
-
-#include <string.h>
 
 #define LINEARISED_DIFFERENCES 8 /* most orders of differences of x_pb, it among them */
 #define LINEARISED_GAINS 5       /* of an expert: of v_d now and before, of x now and the two samples before */

@@ -13,7 +13,6 @@
 #ifndef HSEP_LINEARISED_H
 #define HSEP_LINEARISED_H
 
-#include "hsep_layout.h"
 #include "hsep_averaged_model.h"
 
 typedef struct {

@@ -1,10 +1,6 @@
 #include "hsep_planner.h"
 
 #include "hsep_cholesky.h"
-#include "hsep_math.h"
-#include "hsep_vector.h"
-
-#include <string.h>
 
 #define HSEP_STOP_WORK 300.0 /* multiply-adds for each sample of the preview to carry out a plan */
 

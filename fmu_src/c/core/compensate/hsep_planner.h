@@ -10,7 +10,6 @@
 #define HSEP_PLANNER_H
 
 #include "hsep_interior.h"
-#include "hsep_layout.h"
 #include "hsep_splines.h"
 
 typedef struct {

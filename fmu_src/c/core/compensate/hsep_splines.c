@@ -1,10 +1,5 @@
 #include "hsep_splines.h"
 
-#include "hsep_math.h"
-#include "hsep_vector.h"
-
-#include <string.h>
-
 /* The differences of an order of one spline, in shares, (4 spacing + order,); the first one is 0. */
 static const hsep_real *splines_differences(const hsep_splines *self, unsigned order)
 {

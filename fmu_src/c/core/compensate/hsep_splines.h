@@ -9,9 +9,7 @@
 #define HSEP_SPLINES_H
 
 #include "hsep_knots.h"
-#include "hsep_layout.h"
 #include "hsep_plan_constants.h"
-#include "hsep_vector.h"
 
 #define HSEP_ORDERS 4                          /* orders of difference: 0, the change itself, to 3, its jerk */
 #define HSEP_SPLINES_TOGETHER (4 * HSEP_LANES) /* splines whose products with another one are summed side by side */

@@ -1,10 +1,5 @@
 #include "hsep_plant.h"
 
-#include "hsep_math.h"
-
-#include <math.h>
-#include <string.h>
-
 static const double plant_internal_step = 1e-4;       /* s */
 static const double plant_steps_per_time = 16.0;      /* internal steps in the fastest time constant */
 static const double plant_steps_max = 1e6;            /* internal steps of one step */

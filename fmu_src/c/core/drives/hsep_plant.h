@@ -10,8 +10,6 @@
 #include "hsep_clock.h"
 #include "hsep_physics.h"
 
-#include <stdint.h>
-
 #define HSEP_PLANT_RATE_MAX 1e5 /* 1/s, of a drive's linear part */
 
 /* Longest step, s, of a drive whose fastest rate is that, 1/s: 10^6 internal steps, which bounds its cost. */

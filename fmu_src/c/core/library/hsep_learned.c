@@ -3,9 +3,6 @@
 #include "hsep_cholesky.h"
 #include "hsep_crc.h"
 
-#include <math.h>
-#include <string.h>
-
 HSEP_API int hsep_learned_read(hsep_learned_bytes *from, void *to, size_t size)
 {
     if (size > from->left) {

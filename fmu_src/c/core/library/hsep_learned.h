@@ -10,9 +10,6 @@
 #include "hsep_parameters.h"
 #include "hsep_predictor.h"
 
-#include <stddef.h>
-#include <stdint.h>
-
 #define HSEP_LEARNED_MAGIC "HSEPWG15"
 
 typedef struct {

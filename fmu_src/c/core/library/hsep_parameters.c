@@ -1,9 +1,5 @@
 #include "hsep_parameters.h"
 
-#include "hsep_math.h"
-
-#include <string.h>
-
 static const hsep_real parameters_warm_up_tolerance = 1e-6; /* samples: rounding of times cannot tell */
 static const hsep_real parameters_warm_up = 0.3;            /* s, where it is automatic, without averaging */
 

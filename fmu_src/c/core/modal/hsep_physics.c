@@ -1,10 +1,5 @@
 #include "hsep_physics.h"
 
-#include "hsep_math.h"
-#include "hsep_vector.h"
-
-#include <string.h>
-
 #define PHYSICS_TERMS 20 /* of the series: 0.5^20 / 20! < 1e-24 */
 
 /* E := F G + scale E, all (4, 4) by rows; E is none of the others. */

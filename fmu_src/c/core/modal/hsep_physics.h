@@ -8,8 +8,6 @@
 #include "hsep.h"
 #include "hsep_layout.h"
 
-#include <stddef.h>
-
 /* A mode between two samples: s(k+1) = A s(k) + b u(k), its part of x_pb(k) is c s(k) + d u(k); s in m. */
 typedef struct {
     hsep_real A[4]; /* (2, 2) by rows, 1 */

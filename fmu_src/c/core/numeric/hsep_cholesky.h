@@ -6,8 +6,7 @@
 #ifndef HSEP_CHOLESKY_H
 #define HSEP_CHOLESKY_H
 
-#include "hsep_api.h"
-#include "hsep_real.h"
+#include "hsep_layout.h"
 
 #define HSEP_CHOLESKY_PANEL 8 /* rows of a triangle that are finished together */
 

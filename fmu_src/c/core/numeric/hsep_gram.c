@@ -1,9 +1,6 @@
 #include "hsep_gram.h"
 
 #include "hsep_cholesky.h"
-#include "hsep_vector.h"
-
-#include <string.h>
 
 static hsep_real gram_lay_out(hsep_gram *self, hsep_int n)
 {

@@ -7,13 +7,14 @@
  * hsep_NAME_lay_out sets what follows from the parameters and returns the bytes of the block, counted as a number so
  * that no size can overflow: of a struct alone, too, which asks for the size only; where others need that alone, it is
  * hsep_NAME_size. hsep_NAME_init fills a block with nothing learned. All functions of a block are reentrant and
- * allocate nothing. What a block needs to be declared comes with this header: linkage of its functions, numbers.
+ * allocate nothing. What a block needs comes with this header: linkage of its functions, numbers, libm and vectors.
  */
 #ifndef HSEP_LAYOUT_H
 #define HSEP_LAYOUT_H
 
 #include "hsep_api.h"
-#include "hsep_real.h"
+#include "hsep_math.h"
+#include "hsep_vector.h"
 
 /* Fail to compile unless a condition holds; name: unique among all files. */
 #define HSEP_ASSERT(name, condition) typedef char hsep_assert_##name[(condition) ? 1 : -1]

@@ -1,9 +1,6 @@
 #include "hsep_regression.h"
 
 #include "hsep_cholesky.h"
-#include "hsep_math.h"
-
-#include <string.h>
 
 static const hsep_real regression_lambda_min = HSEP_TINY(1e-290);
 

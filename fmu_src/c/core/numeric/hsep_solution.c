@@ -1,10 +1,6 @@
 #include "hsep_solution.h"
 
 #include "hsep_cholesky.h"
-#include "hsep_math.h"
-#include "hsep_vector.h"
-
-#include <string.h>
 
 static hsep_real solution_lay_out(hsep_solution *self, hsep_int n_head, hsep_int n_tail, hsep_int room)
 {

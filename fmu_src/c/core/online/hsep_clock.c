@@ -1,7 +1,5 @@
 #include "hsep_clock.h"
 
-#include <math.h>
-
 static const double clock_tolerance = 0.05; /* of T_s: importers' times may be whole nanoseconds or single precision */
 static const double clock_noticed = 1e-3;   /* of T_s: deviations beyond it are warned of */
 static const double clock_spacings = 8.0;   /* of doubles at t: a few roundings of the importer's arithmetic */

@@ -10,10 +10,7 @@
 #ifndef HSEP_CLOCK_H
 #define HSEP_CLOCK_H
 
-#include "hsep_api.h"
 #include "hsep_layout.h"
-
-#include <stdint.h>
 
 #define HSEP_CLOCK_STEP_MAX 100.0 /* s */
 

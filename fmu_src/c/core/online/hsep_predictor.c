@@ -1,10 +1,5 @@
 #include "hsep_predictor.h"
 
-#include "hsep_math.h"
-#include "hsep_vector.h"
-
-#include <string.h>
-
 HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters)
 {
     return (hsep_residual_parameters){

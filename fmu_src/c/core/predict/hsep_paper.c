@@ -1,9 +1,5 @@
 #include "hsep_paper.h"
 
-#include "hsep_vector.h"
-
-#include <string.h>
-
 HSEP_API hsep_real hsep_paper_lay_out(hsep_paper *self, const hsep_predictor_settings *settings)
 {
     hsep_real end = HSEP_WORDS(hsep_paper);

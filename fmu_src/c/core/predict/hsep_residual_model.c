@@ -3,7 +3,6 @@
 #include "hsep_cholesky.h"
 
 #include <float.h>
-#include <string.h>
 
 #ifdef HSEP_FLOAT32
 #define RESIDUAL_ROUNDING FLT_EPSILON

@@ -1,10 +1,5 @@
 #include "hsep_uncertainty.h"
 
-#include "hsep_math.h"
-#include "hsep_vector.h"
-
-#include <string.h>
-
 static const hsep_real uncertainty_shares[] = {HSEP_UNCERTAINTY_SHARES};
 static const hsep_real uncertainty_levels[][2] = {HSEP_UNCERTAINTY_LEVELS};
 

@@ -1,10 +1,6 @@
 /* Prediction by an averaged residual model. */
 #include "hsep_averaged_model.h"
 
-#include "hsep_math.h"
-
-#include <string.h>
-
 /* Take the scales of velocity and command; return whether the commanded velocity outgrows what was learned. A
  * compensator begins to move before the path, with a creep: its first scale is the path's. */
 static int averaged_outgrown(hsep_averaged *self, const hsep_real x_d[], const hsep_real path[], hsep_int n_path)

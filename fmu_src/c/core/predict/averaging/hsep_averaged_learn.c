@@ -2,10 +2,6 @@
 #include "hsep_averaged_model.h"
 
 #include "hsep_cholesky.h"
-#include "hsep_math.h"
-#include "hsep_vector.h"
-
-#include <string.h>
 
 HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[])
 {

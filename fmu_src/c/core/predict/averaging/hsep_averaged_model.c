@@ -1,8 +1,6 @@
 /* State of an averaged residual model: its layout and beginning, and what it has learned. */
 #include "hsep_averaged_model.h"
 
-#include "hsep_math.h"
-
 /* Features of the rows of some evidence. */
 static hsep_int averaged_n_features(const hsep_averaged *self, hsep_int kind)
 {

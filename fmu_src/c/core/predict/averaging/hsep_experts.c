@@ -1,8 +1,6 @@
 #include "hsep_experts.h"
 
-#include "hsep_math.h"
 #include "hsep_predict_constants.h"
-#include "hsep_vector.h"
 
 HSEP_API void hsep_residual_scale_follow(
     hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count,

@@ -8,7 +8,6 @@
 #define HSEP_EXPERTS_H
 
 #include "hsep_warm_start.h"
-#include "hsep_layout.h"
 #include "hsep_solution.h"
 
 /* Size of the residuals so far. */

@@ -9,13 +9,9 @@
 #ifndef HSEP_FEATURES_H
 #define HSEP_FEATURES_H
 
-#include "hsep_layout.h"
-#include "hsep_math.h"
 #include "hsep_physics.h"
 #include "hsep_predict_constants.h"
 #include "hsep_window.h"
-
-#include <string.h>
 
 #define HSEP_DISTURBANCES_OF_COMMAND (HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS)
 #define HSEP_DISTURBANCES_STIFFNESS HSEP_DISTURBANCES_OF_COMMAND /* place, behind friction and stop operators */

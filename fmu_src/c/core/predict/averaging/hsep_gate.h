@@ -4,7 +4,6 @@
 #define HSEP_GATE_H
 
 #include "hsep_layout.h"
-#include "hsep_math.h"
 #include "hsep_predict_constants.h"
 
 typedef struct {

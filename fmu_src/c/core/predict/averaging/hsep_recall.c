@@ -1,10 +1,6 @@
 #include "hsep_recall.h"
 
-#include "hsep_math.h"
 #include "hsep_predict_constants.h"
-#include "hsep_vector.h"
-
-#include <string.h>
 
 HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_parameters *parameters)
 {

@@ -1,10 +1,5 @@
 #include "hsep_stacking.h"
 
-#include "hsep_math.h"
-#include "hsep_vector.h"
-
-#include <string.h>
-
 HSEP_API void hsep_stack_init(hsep_stack *self)
 {
     memset(self, 0, sizeof *self);

@@ -1,11 +1,7 @@
 #include "hsep_start.h"
 
-#include "hsep_math.h"
 #include "hsep_predict_constants.h"
 #include "hsep_regression.h"
-#include "hsep_vector.h"
-
-#include <string.h>
 
 HSEP_API hsep_real hsep_start_lay_out(hsep_start *self, const hsep_residual_parameters *parameters)
 {

@@ -5,7 +5,6 @@
 #ifndef HSEP_START_H
 #define HSEP_START_H
 
-#include "hsep_layout.h"
 #include "hsep_physics.h"
 #include "hsep_window.h"
 

@@ -4,9 +4,6 @@
 #define HSEP_WARM_START_H
 
 #include "hsep_gram.h"
-#include "hsep_math.h"
-
-#include <string.h>
 
 typedef struct {
     hsep_int of_run, earlier; /* offsets in words: Gram matrices; one whose n_rows are 0 has no rows */
