@@ -8,17 +8,17 @@ static const hsep_tolerance averaged_planner_tolerance = {HSEP_NEWTON_TOLERANCE}
 HSEP_ASSERT(lengths, sizeof averaged_planner_lengths == HSEP_AVERAGED_TRIES * sizeof(hsep_real));
 
 HSEP_API hsep_real hsep_averaged_planner_lay_out(
-    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner)
+    hsep_averaged_planner *self, const hsep_predictor_parameters *parameters, const hsep_planner_parameters *planner)
 {
     const hsep_int n = hsep_splines_count(planner->preview, planner->spacing);
-    const hsep_real all = (hsep_real)parameters->n, coefficients = HSEP_N_DECIDED + (hsep_real)n,
-                    filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
+    const hsep_real all = (hsep_real)hsep_predicted(parameters), coefficients = HSEP_N_DECIDED + (hsep_real)n,
+                    filter = hsep_physics_lay_out(&(hsep_physics){0}, parameters);
     const hsep_int n_pinned = hsep_planner_n_pinned(planner);
     const hsep_int m = hsep_knots_of(n - n_pinned, planner->window).m;
     const hsep_real preview = (hsep_real)planner->preview;
     hsep_real end = HSEP_WORDS(hsep_averaged_planner);
     self->preview = planner->preview;
-    self->late = hsep_late(parameters->settings);
+    self->late = hsep_late(&parameters->settings);
     self->Np = planner->Np;
     self->n = n;
     self->m = m;
@@ -28,7 +28,7 @@ HSEP_API hsep_real hsep_averaged_planner_lay_out(
     self->of_physics = hsep_take(&end, coefficients);
     self->command = hsep_take(&end, all);
     self->x_pb = hsep_take(&end, all);
-    self->e_h = hsep_take(&end, all + (hsep_real)parameters->settings->p);
+    self->e_h = hsep_take(&end, all + (hsep_real)parameters->settings.p);
     self->target = hsep_take(&end, preview);
     self->weight = hsep_take(&end, preview);
     self->corrected = hsep_take(&end, (hsep_real)n);
@@ -253,12 +253,12 @@ static void averaged_planner_shape_all(hsep_averaged_planner *self, hsep_planner
 }
 
 HSEP_API void hsep_averaged_planner_init(
-    hsep_averaged_planner *self, const hsep_residual_parameters *parameters, const hsep_planner_parameters *planner,
+    hsep_averaged_planner *self, const hsep_predictor_parameters *parameters, const hsep_planner_parameters *planner,
     hsep_planner *plans, const hsep_real spline[])
 {
     (void)hsep_averaged_planner_lay_out(self, parameters, planner);
     self->pause =
-        (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings->T_s) + 0.5);
+        (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings.T_s) + 0.5);
     self->share = 1.0;
     self->reach = HSEP_NEWTON_FIRST_REACH;
     hsep_linearised_init(hsep_part(self, self->linearised), parameters);

@@ -6,7 +6,6 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_c
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const hsep_real preview = (hsep_real)predictor->preview, horizon = (hsep_real)predictor->horizon;
-    const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
     hsep_real end = HSEP_WORDS(hsep_compensator);
     self->n_lost = parameters->n_lost;
     self->x_dm = hsep_take(&end, (hsep_real)predictor->settings.Np);
@@ -16,12 +15,12 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_c
     self->trial_e = hsep_take(&end, horizon + (hsep_real)predictor->settings.p);
     self->target = hsep_take(&end, horizon);
     self->spline_pb = hsep_take(&end, horizon);
-    self->trial = hsep_take_block(&end, hsep_physics_size(predictor->n_modes, predictor->settings.dead_time));
+    self->trial = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, predictor));
     self->planner = hsep_take_block(&end, hsep_planner_lay_out(&(hsep_planner){0}, &parameters->planner));
     self->predictor = hsep_take_block(&end, hsep_predictor_lay_out(&(hsep_predictor){0}, predictor));
     if (predictor->averaging.averaging) {
         self->averaged = hsep_take_block(
-            &end, hsep_averaged_planner_lay_out(&(hsep_averaged_planner){0}, &model, &parameters->planner));
+            &end, hsep_averaged_planner_lay_out(&(hsep_averaged_planner){0}, predictor, &parameters->planner));
     }
     return end * sizeof(hsep_real);
 }
@@ -54,9 +53,8 @@ HSEP_API void hsep_compensator_block_init(
     memcpy(spline, hsep_splines_shape(splines), (size_t)(4 * splines->spacing) * sizeof(hsep_real));
     hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->horizon);
     if (self->averaged) {
-        const hsep_residual_parameters model = hsep_predictor_model_parameters(predictor);
         hsep_averaged_planner_init(
-            hsep_compensator_averaged(self), &model, &parameters->planner, hsep_compensator_planner(self), spline);
+            hsep_compensator_averaged(self), predictor, &parameters->planner, hsep_compensator_planner(self), spline);
     }
 }
 

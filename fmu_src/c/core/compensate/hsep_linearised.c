@@ -22,14 +22,14 @@ static hsep_real *linearised_response(hsep_linearised *self, hsep_int i)
     return hsep_at(self, self->response) + i * (self->preview + LINEARISED_TOGETHER - 1);
 }
 
-HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_real n = (hsep_real)parameters->n, preview = n - (hsep_real)hsep_late(parameters->settings);
-    const hsep_real padded = preview + (LINEARISED_TOGETHER - 1), lags = (hsep_real)parameters->settings->p;
-    const hsep_real filter = hsep_physics_size(parameters->n_modes, parameters->settings->dead_time);
+    const hsep_real n = (hsep_real)hsep_predicted(parameters), preview = (hsep_real)parameters->horizon;
+    const hsep_real padded = preview + (LINEARISED_TOGETHER - 1), lags = (hsep_real)parameters->settings.p;
+    const hsep_real filter = hsep_physics_lay_out(&(hsep_physics){0}, parameters);
     hsep_real end = HSEP_WORDS(hsep_linearised);
-    self->n = parameters->n;
-    self->preview = self->n - hsep_late(parameters->settings);
+    self->n = hsep_predicted(parameters);
+    self->preview = parameters->horizon;
     self->count = hsep_disturbances_count(parameters);
     self->slopes = hsep_take(&end, n * (hsep_real)self->count);
     self->at_stop = hsep_take(&end, n * HSEP_FEATURES_N_STOPS);
@@ -50,13 +50,10 @@ HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_res
     return end * sizeof(hsep_real);
 }
 
-HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_parameters *parameters)
+HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_predictor_settings *settings = parameters->settings;
     (void)hsep_linearised_lay_out(self, parameters);
-    hsep_physics_init(
-        hsep_part(self, self->physics), parameters->modes, parameters->n_modes, settings->dead_time, settings->T_s,
-        (hsep_hold)settings->input_hold);
+    hsep_physics_init(hsep_part(self, self->physics), parameters);
 }
 
 /* Index of a disturbance's first weight among the weights of an expert. */

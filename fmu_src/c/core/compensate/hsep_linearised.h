@@ -44,8 +44,8 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_linearised, 20);
 
-HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_residual_parameters *parameters);
-HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_residual_parameters *parameters);
+HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_predictor_parameters *parameters);
+HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_predictor_parameters *parameters);
 
 /* A change of the commands that begins at sample 0 of the preview. */
 typedef struct {

@@ -83,31 +83,25 @@ HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continu
 
 #define PHYSICS_TOGETHER 64 /* samples whose response is computed mode by mode */
 
-/* Set what follows from the parameters; return the bytes of the block. */
-static hsep_real physics_lay_out(hsep_physics *self, hsep_int n_modes, hsep_int dead_time)
+HSEP_API hsep_real hsep_physics_lay_out(hsep_physics *self, const hsep_predictor_parameters *parameters)
 {
     hsep_real end = HSEP_WORDS(hsep_physics);
-    self->n_modes = n_modes;
-    self->dead_time = dead_time;
-    self->modes = hsep_take(&end, (hsep_real)n_modes * HSEP_WORDS(hsep_discrete_mode));
-    self->ring = hsep_take(&end, (hsep_real)dead_time);
+    self->n_modes = parameters->n_modes;
+    self->dead_time = parameters->settings.dead_time;
+    self->modes = hsep_take(&end, (hsep_real)self->n_modes * HSEP_WORDS(hsep_discrete_mode));
+    self->ring = hsep_take(&end, (hsep_real)self->dead_time);
     return end * sizeof(hsep_real);
 }
 
 static hsep_discrete_mode *physics_modes(hsep_physics *self) { return hsep_part(self, self->modes); }
 
-HSEP_API hsep_real hsep_physics_size(hsep_int n_modes, hsep_int dead_time)
+HSEP_API void hsep_physics_init(hsep_physics *self, const hsep_predictor_parameters *parameters)
 {
-    return physics_lay_out(&(hsep_physics){0}, n_modes, dead_time);
-}
-
-HSEP_API void hsep_physics_init(
-    hsep_physics *self, const hsep_mode modes[], hsep_int n_modes, hsep_int dead_time, hsep_real T_s, hsep_hold hold)
-{
-    memset(self, 0, (size_t)hsep_physics_size(n_modes, dead_time));
-    (void)physics_lay_out(self, n_modes, dead_time);
-    for (hsep_int i = 0; i < n_modes; i++) {
-        hsep_discretise(&physics_modes(self)[i], &modes[i], T_s, hold);
+    const hsep_predictor_settings *settings = &parameters->settings;
+    memset(self, 0, (size_t)hsep_physics_lay_out(self, parameters));
+    (void)hsep_physics_lay_out(self, parameters);
+    for (hsep_int i = 0; i < self->n_modes; i++) {
+        hsep_discretise(&physics_modes(self)[i], &parameters->modes[i], settings->T_s, (hsep_hold)settings->input_hold);
     }
 }
 

@@ -5,7 +5,7 @@
 #ifndef HSEP_PHYSICS_H
 #define HSEP_PHYSICS_H
 
-#include "hsep.h"
+#include "hsep_window.h"
 #include "hsep_layout.h"
 
 /* A mode between two samples: s(k+1) = A s(k) + b u(k), its part of x_pb(k) is c s(k) + d u(k); s in m. */
@@ -34,10 +34,9 @@ HSEP_ASSERT_WORDS(hsep_physics, 5);
  * Cost: about 2 000 multiply-adds, and 64 for each doubling of the norm of the mode times T_s. */
 HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continuous, hsep_real T_s, hsep_hold hold);
 
-HSEP_API hsep_real hsep_physics_size(hsep_int n_modes, hsep_int dead_time);
-/* Fill the block, at rest at position 0. modes: (n_modes,). */
-HSEP_API void hsep_physics_init(
-    hsep_physics *self, const hsep_mode modes[], hsep_int n_modes, hsep_int dead_time, hsep_real T_s, hsep_hold hold);
+HSEP_API hsep_real hsep_physics_lay_out(hsep_physics *self, const hsep_predictor_parameters *parameters);
+/* Fill the block, at rest at position 0. */
+HSEP_API void hsep_physics_init(hsep_physics *self, const hsep_predictor_parameters *parameters);
 
 /* Begin with a state, (2 n_modes + dead_time,), m: the modes', then the commands within the dead time, oldest first. */
 HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[]);

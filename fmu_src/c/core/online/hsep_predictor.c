@@ -1,16 +1,5 @@
 #include "hsep_predictor.h"
 
-HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters)
-{
-    return (hsep_residual_parameters){
-        .settings = &parameters->settings,
-        .averaging = &parameters->averaging,
-        .modes = parameters->modes,
-        .n_modes = parameters->n_modes,
-        .n = parameters->horizon + hsep_late(&parameters->settings),
-        .planned = parameters->planned};
-}
-
 /* Take a signal of the window, this long, and what is before it; return the offset of the window. */
 static hsep_int predictor_take(hsep_real *end, hsep_real late, hsep_real count)
 {
@@ -24,7 +13,6 @@ HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predi
     const hsep_real late = (hsep_real)hsep_late(&parameters->settings), n = Np + late;
     const hsep_real p = (hsep_real)parameters->settings.p, q = (hsep_real)parameters->settings.q;
     hsep_real end = HSEP_WORDS(hsep_predictor);
-    const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
     self->Np = parameters->settings.Np;
     self->late = hsep_late(&parameters->settings);
     self->early = parameters->settings.measurement_delay < 0;
@@ -43,11 +31,11 @@ HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predi
     self->past_x = hsep_take(&end, n + q);
     self->past_e = hsep_take(&end, n + p);
     self->e_h = parameters->planned ? hsep_take(&end, n + p) : self->past_e;
-    self->physics = hsep_take_block(&end, hsep_physics_size(parameters->n_modes, parameters->settings.dead_time));
+    self->physics = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, parameters));
     self->uncertainty = hsep_take_block(&end, hsep_uncertainty_lay_out(&(hsep_uncertainty){0}, self->Np, self->n));
-    self->model = hsep_take_block(&end, hsep_residual_lay_out(&(hsep_residual_model){0}, &model));
+    self->model = hsep_take_block(&end, hsep_residual_lay_out(&(hsep_residual_model){0}, parameters));
     if (parameters->averaging.averaging && !parameters->planned) { /* the state at the run's beginning is corrected */
-        self->motion = hsep_take_block(&end, hsep_start_lay_out(&(hsep_start){0}, &model));
+        self->motion = hsep_take_block(&end, hsep_start_lay_out(&(hsep_start){0}, parameters));
     }
     return end * sizeof(hsep_real);
 }
@@ -62,16 +50,13 @@ HSEP_API void hsep_predictor_block_init(
     for (hsep_int i = self->ahead; i < self->ahead_pb; i++) { /* commands, and the four signals of the window */
         hsep_at(self, 0)[i] = start;
     }
-    hsep_physics_init(
-        hsep_predictor_physics(self), parameters->modes, parameters->n_modes, parameters->settings.dead_time,
-        parameters->settings.T_s, (hsep_hold)parameters->settings.input_hold);
+    hsep_physics_init(hsep_predictor_physics(self), parameters);
     hsep_uncertainty_init(
         hsep_predictor_uncertainty(self), self->Np, self->n,
         hsep_uncertainty_first_variance(parameters->settings.lambda, parameters->averaging.noise_std));
-    const hsep_residual_parameters model = hsep_predictor_model_parameters(parameters);
-    hsep_residual_init(hsep_predictor_model(self), &model, start);
+    hsep_residual_init(hsep_predictor_model(self), parameters, start);
     if (self->motion) {
-        hsep_start_init(hsep_part(self, self->motion), &model);
+        hsep_start_init(hsep_part(self, self->motion), parameters);
     }
 }
 

@@ -33,17 +33,6 @@
 #include "hsep_start.h"
 #include "hsep_uncertainty.h"
 
-typedef struct {
-    hsep_predictor_settings settings;
-    hsep_averaging_settings averaging;
-    hsep_int preview;       /* samples from r(k) to the drive, >= Np; Np alone */
-    hsep_int horizon;       /* samples that are predicted, >= preview, in a compensator's plan; Np alone */
-    hsep_real n_init;       /* samples of warm-up from the beginning; whole, >= 0 */
-    int planned;            /* whether a compensator decides the commands of a window when it begins */
-    hsep_int n_modes;       /* >= 1 */
-    const hsep_mode *modes; /* (n_modes,) */
-} hsep_predictor_parameters;
-
 struct hsep_predictor {
     hsep_int Np, late, n, preview; /* n = Np + late */
     hsep_int p, q;                 /* lags of e_pb and of x_pb */
@@ -90,8 +79,6 @@ static inline hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self)
 {
     return hsep_part(self, self->uncertainty);
 }
-
-HSEP_API hsep_residual_parameters hsep_predictor_model_parameters(const hsep_predictor_parameters *parameters);
 
 /* Process sample k: learn it if it is sound, update the error sums, advance to k + 1; return whether the window has
  * ended. */

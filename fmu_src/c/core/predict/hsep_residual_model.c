@@ -13,28 +13,29 @@
 /* Parts in which the averaged model predicts a window behind its first sample, as variances are dear. */
 static const hsep_int residual_parts = 25;
 
-HSEP_API hsep_real hsep_residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_residual_lay_out(hsep_residual_model *self, const hsep_predictor_parameters *parameters)
 {
     hsep_real end = HSEP_WORDS(hsep_residual_model);
-    self->Np = parameters->settings->Np;
-    self->late = hsep_late(parameters->settings);
+    self->Np = parameters->settings.Np;
+    self->late = hsep_late(&parameters->settings);
     self->n = self->Np + self->late;
     self->planned = parameters->planned != 0;
-    if (parameters->averaging->averaging) {
+    if (parameters->averaging.averaging) {
         self->averaged = hsep_take_block(&end, hsep_averaged_lay_out(&(hsep_averaged){0}, parameters));
     } else {
-        self->paper = hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, parameters->settings));
+        self->paper = hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, &parameters->settings));
     }
     return end * sizeof(hsep_real);
 }
 
-HSEP_API void hsep_residual_init(hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start)
+HSEP_API void hsep_residual_init(
+    hsep_residual_model *self, const hsep_predictor_parameters *parameters, hsep_real start)
 {
     (void)hsep_residual_lay_out(self, parameters);
     if (self->averaged) {
         hsep_averaged_init(hsep_residual_averaged(self), parameters, start);
     } else {
-        hsep_paper_init(hsep_residual_paper(self), parameters->settings);
+        hsep_paper_init(hsep_residual_paper(self), &parameters->settings);
     }
 }
 

@@ -21,10 +21,10 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_residual_model, 7);
 
-HSEP_API hsep_real hsep_residual_lay_out(hsep_residual_model *self, const hsep_residual_parameters *parameters);
+HSEP_API hsep_real hsep_residual_lay_out(hsep_residual_model *self, const hsep_predictor_parameters *parameters);
 /* Fill the block, which is 0, at rest at start, m, with nothing learned. */
 HSEP_API void hsep_residual_init(
-    hsep_residual_model *self, const hsep_residual_parameters *parameters, hsep_real start);
+    hsep_residual_model *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
 /* The implementation; NULL if it is the other one. */
 static inline hsep_paper *hsep_residual_paper(hsep_residual_model *self)

@@ -1,6 +1,6 @@
-/* Signals of a window whose residual a model predicts, and that it learns from.
+/* Parameters of a predictor and its models; signals of a window whose residual a model predicts, and learns from.
  *
- * They are kept newest first: of the n samples that are predicted, late ones and a window or a preview, sample k is at
+ * Signals are kept newest first: of the n samples that are predicted, late ones and a window or a preview, sample k is at
  * place n - 1 - k, and what was before them is behind them; the first Np are measured when the window ends.
  */
 #ifndef HSEP_WINDOW_H
@@ -8,15 +8,22 @@
 
 #include "hsep.h"
 
-/* Parameters of a model. */
 typedef struct {
-    const hsep_predictor_settings *settings;
-    const hsep_averaging_settings *averaging;
+    hsep_predictor_settings settings;
+    hsep_averaging_settings averaging;
+    hsep_int preview;       /* samples from r(k) to the drive, >= Np; Np alone */
+    hsep_int horizon;       /* samples that are predicted, >= preview, in a compensator's plan; Np alone */
+    hsep_real n_init;       /* samples of warm-up from the beginning; whole, >= 0 */
+    int planned;            /* whether a compensator decides the commands of a window when it begins */
+    hsep_int n_modes;       /* >= 1 */
     const hsep_mode *modes; /* (n_modes,) */
-    hsep_int n_modes;
-    hsep_int n;  /* samples of a prediction: of a window, or a compensator's plan, and before it the late ones */
-    int planned; /* whether a compensator decides the commands */
-} hsep_residual_parameters;
+} hsep_predictor_parameters;
+
+/* Samples of a prediction: of a window, or a compensator's plan, and before it the late ones. */
+static inline hsep_int hsep_predicted(const hsep_predictor_parameters *parameters)
+{
+    return parameters->horizon + hsep_late(&parameters->settings);
+}
 
 typedef struct {
     const hsep_real *command; /* (n,) m, commands relative to the start */

@@ -25,15 +25,15 @@ static hsep_real averaged_expert_size(const hsep_averaged *self, hsep_int expert
     return hsep_expert_of(expert).is_fresh ? hsep_fmax(size, hsep_expert_lay_out(&(hsep_expert){0}, &other)) : size;
 }
 
-HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_predictor_settings *settings = parameters->settings;
-    const hsep_averaging_settings *averaging = parameters->averaging;
-    const hsep_real Np = (hsep_real)settings->Np, n = (hsep_real)parameters->n;
+    const hsep_predictor_settings *settings = &parameters->settings;
+    const hsep_averaging_settings *averaging = &parameters->averaging;
+    const hsep_real Np = (hsep_real)settings->Np, n = (hsep_real)hsep_predicted(parameters);
     const hsep_real p_of_command = (hsep_real)HSEP_AVERAGING_LAGS_OF_COMMAND;
     hsep_real end = HSEP_WORDS(hsep_averaged);
     self->Np = settings->Np;
-    self->n = parameters->n;
+    self->n = hsep_predicted(parameters);
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(parameters);
     self->late = hsep_late(settings);
@@ -71,7 +71,7 @@ HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_residua
     return end * sizeof(hsep_real);
 }
 
-HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parameters *parameters, hsep_real start)
+HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_predictor_parameters *parameters, hsep_real start)
 {
     (void)hsep_averaged_lay_out(self, parameters);
     self->leading = HSEP_ARX_RESIDUAL;

@@ -95,9 +95,9 @@ HSEP_ASSERT_WORDS(
     hsep_averaged,
     40 + HSEP_N_RESIDUALS + 4 * HSEP_N_EXPERTS + HSEP_LEARNED_WORDS + sizeof(hsep_gate) / sizeof(hsep_real));
 
-HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_residual_parameters *parameters);
+HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_predictor_parameters *parameters);
 /* Fill the block, which is 0, at rest at start, m, with nothing learned. */
-HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_residual_parameters *parameters, hsep_real start);
+HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
 /* Parts of the block; of the experts not hold. */
 static inline hsep_disturbances *hsep_averaged_disturbances(hsep_averaged *self)

@@ -8,33 +8,29 @@ static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_int i)
     return hsep_part(self, self->filters + i * self->filter_words);
 }
 
-HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_predictor_settings *settings = parameters->settings;
     const hsep_int count = hsep_disturbances_count(parameters);
-    const hsep_real filter = hsep_physics_size(parameters->n_modes, settings->dead_time);
+    const hsep_real filter = hsep_physics_lay_out(&(hsep_physics){0}, parameters);
     hsep_real end = HSEP_WORDS(hsep_disturbances);
     self->count = count;
-    self->period = parameters->averaging->period;
+    self->period = parameters->averaging.period;
     self->n = hsep_disturbances_n(parameters);
     self->n_differences = self->n - 2 - 2 * count;
     self->of_motion = parameters->planned != 0;
-    self->T_s = settings->T_s;
+    self->T_s = parameters->settings.T_s;
     self->filters = hsep_take_block(&end, 2.0 * (hsep_real)count * filter);
     self->filter_words = (hsep_int)(filter / sizeof(hsep_real));
     return end * sizeof(hsep_real);
 }
 
 HSEP_API void hsep_disturbances_init(
-    hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start)
+    hsep_disturbances *self, const hsep_predictor_parameters *parameters, hsep_real start)
 {
-    const hsep_predictor_settings *settings = parameters->settings;
     (void)hsep_disturbances_lay_out(self, parameters);
     self->origin = start;
     for (hsep_int i = 0; i < 2 * self->count; i++) { /* the tried ones, too */
-        hsep_physics_init(
-            disturbances_filter(self, i), parameters->modes, parameters->n_modes, settings->dead_time, settings->T_s,
-            (hsep_hold)settings->input_hold);
+        hsep_physics_init(disturbances_filter(self, i), parameters);
     }
 }
 
@@ -245,13 +241,11 @@ HSEP_API void hsep_disturbances_end(hsep_disturbances *self)
     self->before = self->after;
 }
 
-HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_predictor_settings *settings = parameters->settings;
-    const hsep_int n = parameters->n;
+    const hsep_int n = hsep_predicted(parameters), late = parameters->settings.dead_time, half = late / 2;
     hsep_real end = HSEP_WORDS(hsep_command);
     self->n = n;
-    const hsep_int late = settings->dead_time, half = late / 2;
     const hsep_int early = half > HSEP_AVERAGING_EARLY ? half : HSEP_AVERAGING_EARLY;
     self->dead_time = late > early ? late - early : 0;
     self->n_before = self->dead_time + HSEP_AVERAGING_LAGS_OF_COMMAND + 1;

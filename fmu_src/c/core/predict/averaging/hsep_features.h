@@ -48,20 +48,20 @@ HSEP_ASSERT_WORDS(hsep_disturbed, 1 + HSEP_DISTURBANCES_PAST + HSEP_DISTURBANCES
 HSEP_ASSERT_WORDS(hsep_disturbances, 9 + 2 * sizeof(hsep_disturbed) / sizeof(hsep_real));
 
 /* Disturbances, and features. */
-static inline hsep_int hsep_disturbances_count(const hsep_residual_parameters *parameters)
+static inline hsep_int hsep_disturbances_count(const hsep_predictor_parameters *parameters)
 {
-    return parameters->averaging->period > 0.0 ? HSEP_DISTURBANCES_MAX : HSEP_FEATURES_N_LASTING;
+    return parameters->averaging.period > 0.0 ? HSEP_DISTURBANCES_MAX : HSEP_FEATURES_N_LASTING;
 }
-static inline hsep_int hsep_disturbances_n(const hsep_residual_parameters *parameters)
+static inline hsep_int hsep_disturbances_n(const hsep_predictor_parameters *parameters)
 {
-    const hsep_int q = parameters->settings->q, most = HSEP_FEATURES_DIFFERENCES;
+    const hsep_int q = parameters->settings.q, most = HSEP_FEATURES_DIFFERENCES;
     return 2 + (q < most ? q : most) + 2 * hsep_disturbances_count(parameters);
 }
 
-HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep_residual_parameters *parameters);
+HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep_predictor_parameters *parameters);
 /* Fill the block, which is 0, at rest at start, m. */
 HSEP_API void hsep_disturbances_init(
-    hsep_disturbances *self, const hsep_residual_parameters *parameters, hsep_real start);
+    hsep_disturbances *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
 /* Begin in motion, which went on as the n samples of the first window begin, (n,) m each. */
 HSEP_API void hsep_disturbances_begin_in_motion(
@@ -121,7 +121,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_command, 5);
 
 /* It is all that a block of 0 needs to be at rest. */
-HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_residual_parameters *parameters);
+HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_predictor_parameters *parameters);
 
 /* Take in the commands of the m samples that come next, (m,), m, m <= n; may be tried again with others. */
 static inline void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m)

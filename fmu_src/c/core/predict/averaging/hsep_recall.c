@@ -2,13 +2,13 @@
 
 #include "hsep_predict_constants.h"
 
-HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_real size = (hsep_real)parameters->averaging->recall;
+    const hsep_real size = (hsep_real)parameters->averaging.recall;
     hsep_real end = HSEP_WORDS(hsep_recall);
-    self->size = parameters->averaging->recall;
-    self->Np = parameters->settings->Np;
-    self->n = self->lag = parameters->n;
+    self->size = parameters->averaging.recall;
+    self->Np = parameters->settings.Np;
+    self->n = self->lag = hsep_predicted(parameters);
     self->stride = self->Np > HSEP_RECALL_UPDATES ? self->Np / HSEP_RECALL_UPDATES : 1;
     self->fading = hsep_exp(-(hsep_real)self->stride / (hsep_real)self->Np);
     self->commands = hsep_take(&end, (hsep_real)self->stride);

@@ -33,7 +33,7 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_recall, 16);
 
 /* It is all that a block of 0 needs to be at rest. */
-HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_residual_parameters *parameters);
+HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predictor_parameters *parameters);
 
 /* Take in the command that comes next, m, relative to the start. Cost: size / stride multiply-adds. */
 HSEP_API void hsep_recall_append_command(hsep_recall *self, hsep_real command);

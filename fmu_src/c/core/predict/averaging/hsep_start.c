@@ -3,14 +3,14 @@
 #include "hsep_predict_constants.h"
 #include "hsep_regression.h"
 
-HSEP_API hsep_real hsep_start_lay_out(hsep_start *self, const hsep_residual_parameters *parameters)
+HSEP_API hsep_real hsep_start_lay_out(hsep_start *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_int n_modes = parameters->n_modes, dead_time = parameters->settings->dead_time;
-    const hsep_real Np = (hsep_real)parameters->settings->Np, n = (hsep_real)parameters->n;
+    const hsep_int n_modes = parameters->n_modes, dead_time = parameters->settings.dead_time;
+    const hsep_real Np = (hsep_real)parameters->settings.Np, n = (hsep_real)hsep_predicted(parameters);
     const hsep_real n_states = 2.0 * (hsep_real)n_modes, all = n_states + (hsep_real)dead_time;
     hsep_real end = HSEP_WORDS(hsep_start);
-    self->Np = parameters->settings->Np;
-    self->n = parameters->n;
+    self->Np = parameters->settings.Np;
+    self->n = hsep_predicted(parameters);
     self->n_states = 2 * n_modes;
     self->dead_time = dead_time;
     self->states = hsep_take(&end, all);
@@ -18,14 +18,14 @@ HSEP_API hsep_real hsep_start_lay_out(hsep_start *self, const hsep_residual_para
     self->response = hsep_take(&end, n + Np);
     self->responses = hsep_take(&end, n_states * n);
     self->weights = hsep_take(&end, n_states);
-    self->trial = hsep_take_block(&end, hsep_physics_size(n_modes, dead_time));
+    self->trial = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, parameters));
     self->regression = hsep_take_block(&end, hsep_regression_size(self->n_states));
     return end * sizeof(hsep_real);
 }
 
-HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *parameters)
+HSEP_API void hsep_start_init(hsep_start *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_predictor_settings *settings = parameters->settings;
+    const hsep_predictor_settings *settings = &parameters->settings;
     (void)hsep_start_lay_out(self, parameters);
     hsep_real *states = hsep_at(self, self->states), *within = states + self->n_states;
     const hsep_real late = (hsep_real)(settings->dead_time + (self->n - self->Np)); /* samples */
@@ -39,9 +39,7 @@ HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *
     for (hsep_int i = 0; i < self->dead_time; i++) {
         within[i] = (hsep_real)i - late;
     }
-    hsep_physics_init(
-        hsep_part(self, self->trial), parameters->modes, parameters->n_modes, settings->dead_time, settings->T_s,
-        (hsep_hold)settings->input_hold);
+    hsep_physics_init(hsep_part(self, self->trial), parameters);
     hsep_regression_init(hsep_part(self, self->regression), self->n_states, HSEP_START_DAMPING);
 }
 

@@ -22,9 +22,9 @@ typedef struct {
 
 HSEP_ASSERT_WORDS(hsep_start, 11);
 
-HSEP_API hsep_real hsep_start_lay_out(hsep_start *self, const hsep_residual_parameters *parameters);
+HSEP_API hsep_real hsep_start_lay_out(hsep_start *self, const hsep_predictor_parameters *parameters);
 /* Fill the block, which is 0. */
-HSEP_API void hsep_start_init(hsep_start *self, const hsep_residual_parameters *parameters);
+HSEP_API void hsep_start_init(hsep_start *self, const hsep_predictor_parameters *parameters);
 
 /* Whether the commands of the first window, (n,), m, begin in motion. */
 HSEP_API int hsep_start_moves(const hsep_start *self, const hsep_real x_d[]);
