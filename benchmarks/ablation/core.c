@@ -35,21 +35,24 @@ static int replay_run(hsep_predictor *predictor, const replayed_run *run, hsep_p
 /* As a warm start does it, by way of a file. */
 static void replay_take_over(hsep_predictor *predictor, hsep_predictor *trained)
 {
-    hsep_residual_model *to = hsep_predictor_model(predictor), *from = hsep_predictor_model(trained);
-    memcpy(hsep_residual_learned(to), hsep_residual_learned(from), hsep_residual_n_learned(to) * sizeof(double));
-    for (uint64_t i = 0; hsep_residual_averaged(from) != NULL && i < HSEP_N_RESIDUALS; i++) {
-        hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(hsep_residual_averaged(from), i));
-        hsep_gram *learned = hsep_warm_start_of_run(hsep_averaged_evidence(hsep_residual_averaged(to), i));
-        memcpy(learned, gram, (size_t)hsep_gram_size(gram->n));
+    hsep_averaged *to = hsep_predictor_averaged(predictor), *from = hsep_predictor_averaged(trained);
+    if (from != NULL) {
+        memcpy(&to->learned, &from->learned, (HSEP_LEARNED_WORDS + from->n_static) * sizeof(double));
+    } else {
+        hsep_regression *factor = hsep_paper_regression(hsep_predictor_paper(trained));
+        memcpy(hsep_paper_regression(hsep_predictor_paper(predictor)), factor, (size_t)hsep_regression_size(factor->n));
     }
-    if (hsep_residual_paper(from) != NULL) {
-        hsep_regression *factor = hsep_paper_regression(hsep_residual_paper(from));
-        memcpy(hsep_paper_regression(hsep_residual_paper(to)), factor, (size_t)hsep_regression_size(factor->n));
+    for (uint64_t i = 0; from != NULL && i < HSEP_N_RESIDUALS; i++) {
+        hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(from, i));
+        hsep_gram *learned = hsep_warm_start_of_run(hsep_averaged_evidence(to, i));
+        memcpy(learned, gram, (size_t)hsep_gram_size(gram->n));
     }
     memcpy(
         hsep_predictor_uncertainty(predictor)->theta, hsep_predictor_uncertainty(trained)->theta,
         HSEP_N_UNCERTAINTY * sizeof(double));
-    hsep_residual_restart(to);
+    if (to != NULL) {
+        hsep_averaged_restart(to);
+    }
 }
 
 /* Return whether both runs were predicted without divergence. */

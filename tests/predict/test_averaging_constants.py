@@ -24,9 +24,8 @@ PLAIN = {0.0, 0.5, 1.0, 2.0}  # magnitudes that need no reason
 LIBRARY_ALONE = {"__init__", "constants", "regression", "predictor"}
 """Constants are generated for C; its regression is below ``numeric``, its predictor below ``online``."""
 
-CORE_ALONE = {"predict_constants", "averaged_forecast", "averaged_learn", "residual_model"}
-"""Generated header; parts of the model, which the library has in one file; what calls either model, there a Protocol
-of windows."""
+CORE_ALONE = {"predict_constants", "averaged_forecast", "averaged_learn"}
+"""Generated header; parts of the model, which the library has in one file."""
 
 AVERAGED = {"model": "averaged_model"}
 """Names of C's files that are not the library's: C's own `hsep_model.h` is what an adapter sees."""

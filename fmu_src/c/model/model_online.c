@@ -431,7 +431,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
 {
     online_state *self = state;
     hsep_predictor *predictor = online_predictor(&self->online);
-    const int may_miss = hsep_residual_averaged(hsep_predictor_model(predictor)) != NULL;
+    const int may_miss = hsep_predictor_averaged(predictor) != NULL;
     online_step step;
     if (online_converges(predictor, message) != HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;

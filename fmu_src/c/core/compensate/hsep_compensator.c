@@ -68,7 +68,7 @@ static hsep_averaged_task compensator_task(hsep_compensator *self)
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     return (hsep_averaged_task){
         .predictor = predictor,
-        .model = hsep_residual_averaged(hsep_predictor_model(predictor)),
+        .model = hsep_predictor_averaged(predictor),
         .planner = hsep_compensator_planner(self),
         .x_d = hsep_at(predictor, predictor->x_d),
         .load = hsep_at(self, self->load)};
@@ -92,7 +92,7 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
         target[k] = x_d[k] - predictor->start - x[horizon - 1 - k];
     }
     if (state == HSEP_SEP_HYBRID) {
-        const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 1);
+        const hsep_recursion recursion = hsep_paper_recursion(hsep_predictor_paper(predictor), 1);
         memcpy(x + horizon, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(hsep_real));
         memcpy(e + horizon, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(hsep_real));
         hsep_recursion_run(&recursion, x, e, horizon, 0, horizon);
@@ -107,7 +107,7 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 static const hsep_real *compensator_filter_spline(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    const hsep_recursion recursion = hsep_paper_recursion(hsep_residual_paper(hsep_predictor_model(predictor)), 0);
+    const hsep_recursion recursion = hsep_paper_recursion(hsep_predictor_paper(predictor), 0);
     const hsep_int horizon = compensator_horizon(self);
     const hsep_real *spline_pb = hsep_at(self, self->spline_pb);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
@@ -179,8 +179,7 @@ static void compensator_publish(hsep_compensator *self, hsep_int last)
             hsep_at(predictor, predictor->e_h), hsep_at_const(averaged, averaged->e_h) + (averaged->preview - Np),
             (size_t)predictor->n * sizeof(hsep_real));
     } else {
-        const hsep_residual_window window = hsep_predictor_window(predictor);
-        hsep_residual_predict(hsep_predictor_model(predictor), &window, first, last);
+        hsep_predictor_predict(predictor, first, last);
     }
     hsep_predictor_publish(predictor, last);
     hsep_predictor_predict_std(predictor, 0, predictor->n);
@@ -230,7 +229,7 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
 static int compensator_plan(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    hsep_paper *paper = hsep_residual_paper(hsep_predictor_model(predictor));
+    hsep_paper *paper = hsep_predictor_paper(predictor);
     const hsep_recursion recursion = hsep_paper_recursion(paper, 0);
     hsep_plan_status status = HSEP_PLAN_FAILED;
     const hsep_int before = self->state;

@@ -3,6 +3,14 @@
 #include "hsep_cholesky.h"
 #include "hsep_crc.h"
 
+#include <float.h>
+
+#ifdef HSEP_FLOAT32
+#define LEARNED_ROUNDING FLT_EPSILON
+#else
+#define LEARNED_ROUNDING DBL_EPSILON
+#endif
+
 HSEP_API int hsep_learned_read(hsep_learned_bytes *from, void *to, size_t size)
 {
     if (size > from->left) {
@@ -32,15 +40,50 @@ static int learned_numbers(hsep_learned_bytes *from, hsep_real to[], uint64_t n)
     return 1;
 }
 
-/* Read the number of rows of a factor, and it row after row through the model's own row: 0 if it is damaged. */
-static int learned_take_factor(hsep_learned_bytes *from, hsep_residual_model *model, hsep_int factor)
+/* Factors that are learned: the first one has the rows of the physics model's residual. */
+static hsep_int learned_n_factors(const hsep_averaged *averaged) { return averaged != NULL ? HSEP_N_RESIDUALS : 1; }
+
+static hsep_gram *learned_gram(hsep_averaged *averaged, hsep_int factor)
 {
-    const hsep_int n = hsep_residual_n_features(model, factor);
+    return hsep_warm_start_of_run(hsep_averaged_evidence(averaged, factor));
+}
+
+/* Features of a factor. */
+static hsep_int learned_n_features(hsep_predictor *predictor, hsep_int factor)
+{
+    hsep_averaged *averaged = hsep_predictor_averaged(predictor);
+    return averaged != NULL ? learned_gram(averaged, factor)->n
+                            : hsep_paper_regression(hsep_predictor_paper(predictor))->n;
+}
+
+/* Numbers learned besides them; none without averaging. */
+static hsep_int learned_n_numbers(const hsep_averaged *averaged)
+{
+    return averaged != NULL ? HSEP_LEARNED_WORDS + averaged->n_static : 0;
+}
+
+/* Read the number of rows of a factor, and it row after row through the model's own row: 0 if it is damaged. */
+static int learned_take_factor(hsep_learned_bytes *from, hsep_predictor *predictor, hsep_int factor)
+{
+    hsep_averaged *averaged = hsep_predictor_averaged(predictor);
+    const hsep_int n = learned_n_features(predictor, factor);
+    hsep_gram *gram = averaged != NULL ? learned_gram(averaged, factor) : NULL;
+    hsep_regression *regression = gram == NULL ? hsep_paper_regression(hsep_predictor_paper(predictor)) : NULL;
     hsep_real n_rows = 0.0;
     int taken = learned_numbers(from, &n_rows, 1);
     for (hsep_int i = 0; taken && i <= n; i++) {
-        taken = learned_numbers(from, hsep_residual_factor_row(model, factor), n + 1 - i);
-        hsep_residual_load(model, factor, i, n_rows);
+        if (gram != NULL) {
+            taken = learned_numbers(from, hsep_gram_row(gram), n + 1 - i);
+            hsep_gram_load(gram, i);
+        } else {
+            taken = learned_numbers(from, hsep_regression_row(regression), n + 1 - i);
+            hsep_regression_load(regression, i);
+        }
+    }
+    if (gram != NULL) {
+        gram->n_rows = n_rows;
+    } else {
+        regression->n_rows = n_rows;
     }
     return taken;
 }
@@ -48,18 +91,21 @@ static int learned_take_factor(hsep_learned_bytes *from, hsep_residual_model *mo
 /* Take what follows the settings, up to the checksum: 0 if it is not what these settings learn. */
 static int learned_take(hsep_learned_bytes *from, const hsep_learned_head *head, hsep_predictor *predictor)
 {
-    hsep_residual_model *model = hsep_predictor_model(predictor);
-    if (head->n_learned != HSEP_N_UNCERTAINTY + hsep_residual_n_learned(model) ||
-        !learned_numbers(from, hsep_residual_learned(model), hsep_residual_n_learned(model)) ||
+    hsep_averaged *averaged = hsep_predictor_averaged(predictor);
+    const hsep_int n_numbers = learned_n_numbers(averaged);
+    if (head->n_learned != HSEP_N_UNCERTAINTY + n_numbers ||
+        (averaged != NULL && !learned_numbers(from, &averaged->learned.velocity_scale, n_numbers)) ||
         !learned_numbers(from, hsep_predictor_uncertainty(predictor)->theta, HSEP_N_UNCERTAINTY)) {
         return 0;
     }
-    for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
-        if (!learned_take_factor(from, model, i)) {
+    for (hsep_int i = 0; i < learned_n_factors(averaged); i++) {
+        if (!learned_take_factor(from, predictor, i)) {
             return 0;
         }
     }
-    hsep_residual_restart(model);
+    if (averaged != NULL) {
+        hsep_averaged_restart(averaged);
+    }
     return from->left == sizeof(uint64_t);
 }
 
@@ -156,6 +202,32 @@ hsep_learned_load(hsep_predictor *predictor, const hsep_parameters *parameters, 
     return learned_take(&from, &head, predictor) ? HSEP_BEGAN : HSEP_WEIGHTS_DAMAGED;
 }
 
+/* Write a factor of all that was learned, of this run and earlier ones, a triangle of n + 1 rows; return the rows that
+ * it is from, weighted. Cost: with averaging n^3 / 6 multiply-adds. */
+static hsep_real learned_factor(hsep_predictor *predictor, hsep_int factor, hsep_real triangle[])
+{
+    const hsep_int width = learned_n_features(predictor, factor) + 1;
+    if (hsep_predictor_averaged(predictor) == NULL) {
+        hsep_regression *regression = hsep_paper_regression(hsep_predictor_paper(predictor));
+        hsep_regression_write(regression, triangle);
+        return regression->n_rows;
+    }
+    hsep_warm_start *evidence = hsep_averaged_evidence(hsep_predictor_averaged(predictor), factor);
+    hsep_gram *of_run = hsep_warm_start_of_run(evidence), *earlier = hsep_warm_start_earlier(evidence);
+    hsep_real *least = hsep_gram_row(of_run), *diagonal = triangle; /* work */
+    memset(triangle, 0, (size_t)hsep_triangle(width) * sizeof(hsep_real));
+    hsep_gram_add_to(of_run, triangle);
+    if (earlier->n_rows > 0.0) {
+        hsep_gram_add_to(earlier, triangle);
+    }
+    for (hsep_int i = 0; i < width; i++) { /* what rounding leaves of a pivot where rows are few or alike */
+        least[i] = LEARNED_ROUNDING * *diagonal + HSEP_TINY(1e-40);
+        diagonal += width - i;
+    }
+    (void)hsep_cholesky_rows(triangle, width, 0, width, least);
+    return hsep_warm_start_n_rows(evidence);
+}
+
 /* Write n numbers as doubles; they may lie at the end of where they go. */
 static double *learned_put(double to[], const hsep_real from[], hsep_int n)
 {
@@ -168,13 +240,13 @@ static double *learned_put(double to[], const hsep_real from[], hsep_int n)
 HSEP_API size_t
 hsep_predictor_weights(hsep_predictor *self, const hsep_parameters *parameters, void *bytes, size_t size)
 {
-    hsep_residual_model *model = hsep_predictor_model(self);
-    const hsep_int n_learned = hsep_residual_n_learned(model);
+    hsep_averaged *averaged = hsep_predictor_averaged(self);
+    const hsep_int n_learned = learned_n_numbers(averaged);
     hsep_learned_head head = {{0}, learned_n_settings(parameters), parameters->n_modes, HSEP_N_UNCERTAINTY + n_learned};
     memcpy(head.magic, HSEP_LEARNED_MAGIC, sizeof head.magic);
     size_t numbers = (size_t)head.n_learned + 1;
-    for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
-        numbers += 1 + (size_t)hsep_triangle(hsep_residual_n_features(model, i) + 1);
+    for (hsep_int i = 0; i < learned_n_factors(averaged); i++) {
+        numbers += 1 + (size_t)hsep_triangle(learned_n_features(self, i) + 1);
     }
     const size_t needed =
         sizeof head + (size_t)head.n_settings * sizeof(hsep_learned_setting) + numbers * sizeof(double);
@@ -186,12 +258,15 @@ hsep_predictor_weights(hsep_predictor *self, const hsep_parameters *parameters, 
     for (uint64_t mode = 0; mode <= parameters->n_modes; mode++) {
         setting += learned_settings(parameters, mode, setting);
     }
-    double *to = learned_put((double *)(void *)setting, hsep_residual_learned(model), n_learned);
+    double *to = (double *)(void *)setting;
+    if (averaged != NULL) {
+        to = learned_put(to, &averaged->learned.velocity_scale, n_learned);
+    }
     to = learned_put(to, hsep_predictor_uncertainty(self)->theta, HSEP_N_UNCERTAINTY);
-    for (hsep_int i = 0; i < hsep_residual_n_factors(model); i++) {
-        const hsep_int count = (hsep_int)hsep_triangle(hsep_residual_n_features(model, i) + 1);
+    for (hsep_int i = 0; i < learned_n_factors(averaged); i++) {
+        const hsep_int count = (hsep_int)hsep_triangle(learned_n_features(self, i) + 1);
         hsep_real *triangle = (hsep_real *)(void *)(to + 1 + count) - count; /* at the end of where it goes */
-        *to = (double)hsep_residual_factor(model, i, triangle);
+        *to = (double)learned_factor(self, i, triangle);
         to = learned_put(to + 1, triangle, count);
     }
     const uint64_t sum = hsep_crc(bytes, needed - sizeof sum);

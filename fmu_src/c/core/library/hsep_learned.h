@@ -1,7 +1,7 @@
 /* What was learned, as the file weights.bin has it; hybridsep/fmi/weights.py writes it.
  *
  * Little-endian: the head; the settings that shape features and factors; as doubles the numbers of
- * hsep_residual_learned, and of hsep_uncertainty from theta on; for each factor [R z; 0 rho] of hsep_residual_load its
+ * hsep_learned, and of hsep_uncertainty from theta on; for each factor [R z; 0 rho] of what is learned its
  * weighted number of rows and its upper triangle by rows, (n + 1)(n + 2)/2 doubles for n features; the CRC-32 of all
  * before as uint64. Reentrant; allocates nothing. */
 #ifndef HSEP_LEARNED_H

@@ -6,6 +6,27 @@ static hsep_int predictor_take(hsep_real *end, hsep_real late, hsep_real count)
     return hsep_take(end, late + count) + (hsep_int)late;
 }
 
+/* Parts in which the averaged model predicts a window behind its first sample, as variances are dear. */
+static const hsep_int predictor_parts = 25;
+
+static hsep_residual_model *predictor_model(hsep_predictor *self) { return hsep_part(self, self->model); }
+
+static hsep_real predictor_lay_out_model(hsep_residual_model *self, const hsep_predictor_parameters *parameters)
+{
+    const hsep_predictor_settings *settings = &parameters->settings;
+    hsep_real end = HSEP_WORDS(hsep_residual_model);
+    self->Np = settings->Np;
+    self->late = hsep_late(settings);
+    self->n = self->Np + self->late;
+    self->planned = parameters->planned != 0;
+    if (parameters->averaging.averaging) {
+        self->averaged = hsep_take_block(&end, hsep_averaged_lay_out(&(hsep_averaged){0}, parameters));
+    } else {
+        self->paper = hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, settings));
+    }
+    return end * sizeof(hsep_real);
+}
+
 HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
     const hsep_real Np = (hsep_real)parameters->settings.Np, preview = (hsep_real)parameters->preview;
@@ -33,7 +54,7 @@ HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predi
     self->e_h = parameters->planned ? hsep_take(&end, n + p) : self->past_e;
     self->physics = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, parameters));
     self->uncertainty = hsep_take_block(&end, hsep_uncertainty_lay_out(&(hsep_uncertainty){0}, self->Np, self->n));
-    self->model = hsep_take_block(&end, hsep_residual_lay_out(&(hsep_residual_model){0}, parameters));
+    self->model = hsep_take_block(&end, predictor_lay_out_model(&(hsep_residual_model){0}, parameters));
     if (parameters->averaging.averaging && !parameters->planned) { /* the state at the run's beginning is corrected */
         self->motion = hsep_take_block(&end, hsep_start_lay_out(&(hsep_start){0}, parameters));
     }
@@ -54,19 +75,15 @@ HSEP_API void hsep_predictor_block_init(
     hsep_uncertainty_init(
         hsep_predictor_uncertainty(self), self->Np, self->n,
         hsep_uncertainty_first_variance(parameters->settings.lambda, parameters->averaging.noise_std));
-    hsep_residual_init(hsep_predictor_model(self), parameters, start);
+    (void)predictor_lay_out_model(predictor_model(self), parameters);
+    if (parameters->averaging.averaging) {
+        hsep_averaged_init(hsep_predictor_averaged(self), parameters, start);
+    } else {
+        hsep_paper_init(hsep_predictor_paper(self), &parameters->settings);
+    }
     if (self->motion) {
         hsep_start_init(hsep_part(self, self->motion), parameters);
     }
-}
-
-HSEP_API hsep_residual_window hsep_predictor_window(hsep_predictor *self)
-{
-    return (hsep_residual_window){
-        .command = hsep_at(self, self->command),
-        .x_pb = hsep_at(self, self->past_x),
-        .e = hsep_at(self, self->past_e),
-        .e_h = hsep_at(self, self->e_h)};
 }
 
 /* Whether commands and x_pb of the window will not change any more: they are all decided, and no motion before the run
@@ -76,6 +93,25 @@ static int predictor_settled(hsep_predictor *self)
     const int is_first = self->motion && self->k < self->preview + self->Np;
     const hsep_start *motion = hsep_part_const(self, self->motion);
     return self->n_published == self->Np && !(is_first && hsep_start_moves(motion, hsep_at(self, self->command)));
+}
+
+/* Take in sample i of the window; measured: m, its position; command: m, the one that came with it. */
+static void predictor_learn(hsep_predictor *self, hsep_int i, hsep_real measured, hsep_real command)
+{
+    hsep_averaged *averaged = hsep_predictor_averaged(self);
+    const int learning = predictor_model(self)->learning != 0;
+    hsep_real *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
+    if (averaged != NULL) {
+        hsep_recall_append_command(hsep_averaged_recall(averaged), command - self->start);
+        hsep_at(averaged, averaged->measured)[self->Np - 1 - i] = measured - self->start;
+        if (learning && predictor_settled(self)) {
+            hsep_averaged_follow(
+                averaged, hsep_at(self, self->command) + self->late, past_x + self->late, past_e + self->late, i + 1);
+        }
+    } else if (learning) {
+        const hsep_int j = self->n - 1 - i;
+        hsep_paper_learn(hsep_predictor_paper(self), past_x + j, past_e + j);
+    }
 }
 
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real measured, int is_sound)
@@ -88,15 +124,7 @@ HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, h
     const hsep_real x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_at(self, self->past_e)[j] = learned - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
-    const hsep_residual_window window = hsep_predictor_window(self);
-    const hsep_residual_sample sample = {
-        .i = i,
-        .settled = predictor_settled(self),
-        .relative = learned - self->start,
-        .command = x_d_ahead - self->start,
-        .x = hsep_at(self, self->past_x) + j,
-        .e = hsep_at(self, self->past_e) + j};
-    hsep_residual_take_in(hsep_predictor_model(self), &window, &sample);
+    predictor_learn(self, i, learned, x_d_ahead);
     if (self->k >= self->preview + late && !isnan(x_meas)) {
         self->residual = x_meas - x_pb;
     }
@@ -117,7 +145,7 @@ static void predictor_start(hsep_predictor *self)
     const hsep_int Np = self->Np, late = self->late;
     hsep_start *motion = hsep_part(self, self->motion);
     hsep_uncertainty *uncertainty = hsep_predictor_uncertainty(self);
-    hsep_averaged *averaged = hsep_residual_averaged(hsep_predictor_model(self));
+    hsep_averaged *averaged = hsep_predictor_averaged(self);
     hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
     hsep_real *e = hsep_at(self, self->past_e) + late, *work = hsep_at(averaged, averaged->x);
     const hsep_real *e_h = hsep_at(uncertainty, uncertainty->e_h) + late;
@@ -135,14 +163,20 @@ static void predictor_start(hsep_predictor *self)
 HSEP_API void hsep_predictor_finish(hsep_predictor *self)
 {
     const hsep_int n = self->n, late = self->late;
-    const hsep_residual_window window = hsep_predictor_window(self);
-    hsep_residual_model *model = hsep_predictor_model(self);
+    const hsep_residual_model *model = predictor_model(self);
+    hsep_averaged *averaged = hsep_predictor_averaged(self);
     hsep_real *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
     if (self->motion && self->k == self->preview + self->Np) {
         predictor_start(self);
     }
-    if (hsep_residual_finish(model, &window)) {
-        hsep_uncertainty_learn(hsep_predictor_uncertainty(self), past_e + late, hsep_residual_accepted(model));
+    if (averaged != NULL &&
+        (model->learning || model->planned)) { /* a first fill that was planned is what was before */
+        hsep_averaged_learn(
+            averaged, hsep_at(self, self->command) + late, past_x + late, past_e + late, model->learning != 0);
+    }
+    if (model->learning) {
+        const hsep_real *accepted = averaged != NULL ? hsep_at(averaged, averaged->accepted) : NULL; /* all */
+        hsep_uncertainty_learn(hsep_predictor_uncertainty(self), past_e + late, accepted);
     }
     memcpy(past_x + n, past_x + late, (size_t)self->q * sizeof(hsep_real)); /* q < Np, p <= Np: they do not overlap */
     memcpy(past_e + n, past_e + late, (size_t)self->p * sizeof(hsep_real));
@@ -152,7 +186,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
 {
     const hsep_int n = self->n, oldest = self->k % self->preview, newest = self->preview - oldest;
     const hsep_real *ahead = hsep_at(self, self->ahead), *past_e = hsep_at(self, self->past_e);
-    const hsep_averaged *averaged = hsep_residual_averaged(hsep_predictor_model(self));
+    const hsep_averaged *averaged = hsep_predictor_averaged(self);
     hsep_real *x_d = hsep_at(self, self->x_d), *e_h = hsep_at(self, self->e_h);
     /* The samples of the last window that are not measured yet go before this one. */
     const hsep_int newest_first[2] = {self->command, self->past_x};
@@ -170,7 +204,11 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     if (e_h != past_e) {
         memcpy(e_h + n, past_e + n, (size_t)self->p * sizeof(hsep_real));
     }
-    hsep_residual_begin(hsep_predictor_model(self), self->k >= self->preview); /* the first fill is not learned */
+    predictor_model(self)->learning = self->k >= self->preview; /* the first fill is not learned */
+    if (averaged == NULL) {                                     /* the weights, eq. (6) */
+        hsep_paper *paper = hsep_predictor_paper(self);
+        hsep_regression_solve(hsep_paper_regression(paper), hsep_at(paper, paper->weights));
+    }
     self->n_published = 0;
     self->held = self->residual;
     hsep_predictor_uncertainty(self)->least = averaged != NULL ? averaged->reach.farthest : 0.0;
@@ -204,25 +242,51 @@ HSEP_API hsep_int hsep_predictor_warm_up(const hsep_predictor *self, hsep_int la
 
 HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_int first, hsep_int last)
 {
+    hsep_averaged *averaged = hsep_predictor_averaged(self);
     const hsep_uncertainty_signals signals = {
         .x_pb = hsep_at(self, self->past_x),
         .e_h = hsep_at(self, self->e_h),
         .n_physics = hsep_predictor_warm_up(self, self->late),
-        .variance = hsep_residual_variance(hsep_predictor_model(self))};
+        .variance = averaged != NULL ? hsep_at(averaged, averaged->variance) + (averaged->n - self->n) : NULL};
     if (self->divergence == HSEP_CONVERGES) {
         hsep_uncertainty_predict(hsep_predictor_uncertainty(self), &signals, first, last);
     }
+}
+
+HSEP_API void hsep_predictor_predict(hsep_predictor *self, hsep_int first, hsep_int last)
+{
+    hsep_averaged *averaged = hsep_predictor_averaged(self);
+    const hsep_real *past_x = hsep_at(self, self->past_x);
+    hsep_real *e_h = hsep_at(self, self->e_h);
+    if (averaged == NULL) {
+        const hsep_recursion recursion = hsep_paper_recursion(hsep_predictor_paper(self), 1);
+        hsep_recursion_run(&recursion, past_x, e_h, self->n, first, last); /* Eq. (4) */
+    } else if (first == 0) {
+        hsep_averaged_forecast(averaged, hsep_at(self, self->command), past_x, NULL, 0, e_h, last);
+    } else {
+        hsep_averaged_go_on(averaged, past_x, e_h, first, last, 1);
+    }
+}
+
+/* Samples to predict next, of those behind the published ones. */
+static hsep_int predictor_part(hsep_predictor *self)
+{
+    const hsep_int part = (self->Np - 1) / predictor_parts + 1;
+    if (hsep_predictor_averaged(self) == NULL) {
+        return self->Np;
+    }
+    /* The first part comes with the weights; variances of the others side by side. */
+    return self->n_published == 0 ? 1 : part > HSEP_SOLUTION_ABREAST ? part : HSEP_SOLUTION_ABREAST;
 }
 
 /* Predict the next samples of the window; with the first of them also the late samples, which are not measured yet. */
 static void predictor_go_on(hsep_predictor *self)
 {
     const hsep_int late = self->late, published = self->n_published, left = self->Np - published;
-    const hsep_int part = hsep_residual_part(hsep_predictor_model(self), published);
+    const hsep_int part = predictor_part(self);
     const hsep_int last = published + (left < part ? left : part);
     const hsep_int first = published > 0 ? late + published : 0;
-    const hsep_residual_window window = hsep_predictor_window(self);
-    hsep_residual_predict(hsep_predictor_model(self), &window, first, late + last);
+    hsep_predictor_predict(self, first, late + last);
     hsep_predictor_publish(self, last);
     hsep_predictor_predict_std(self, first, late + last);
 }
@@ -280,6 +344,8 @@ static hsep_real predictor_rms(const hsep_predictor *self, hsep_real sum)
 HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs)
 {
     const hsep_int i = self->k % self->Np;
+    const hsep_residual_model *model = hsep_part_const(self, self->model);
+    const hsep_averaged *averaged = hsep_part_const(model, model->averaged);
     outputs->x_d = hsep_at_const(self, self->x_d)[i];
     outputs->x_pb = hsep_at_const(self, self->x_pb)[i];
     outputs->x_h = hsep_at_const(self, self->x_h)[i];
@@ -289,7 +355,7 @@ HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_out
     outputs->rms_h = predictor_rms(self, self->sum_h);
     outputs->rms_hold = predictor_rms(self, self->sum_hold);
     outputs->batch = self->k / self->Np;
-    outputs->n_rejected = hsep_residual_n_rejected(hsep_part_const(self, self->model));
+    outputs->n_rejected = model->averaged ? averaged->n_rejected : 0;
     outputs->hybrid_active = i >= self->n_physics;
     outputs->divergence = (hsep_divergence)self->divergence;
 }

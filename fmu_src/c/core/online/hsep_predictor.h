@@ -17,7 +17,7 @@
  * of a window (Np (p + q + 2) + n^2 / 2) multiply-adds on top. Never more, at no sample number. With averaging a sample
  * costs two hsep_gram_fold, before the end of a window a share of the next solutions (hsep_solution.h), and the end of
  * a window hsep_averaged_learn and hsep_averaged_forecast. The latter leaves most of the window that begins to the next
- * samples: each of them does one hsep_residual_part. At the end of a first window whose commands begin in motion all
+ * samples: each of them does a part. At the end of a first window whose commands begin in motion all
  * its rows are folded and the solutions factored at once.
  *
  * A block as hsep_layout.h has them. Once the parameters are in range nothing here fails but the prediction of a
@@ -27,11 +27,23 @@
 #define HSEP_PREDICTOR_H
 
 #include "hsep.h"
+#include "hsep_averaged_model.h"
+#include "hsep_paper.h"
 #include "hsep_physics.h"
-#include "hsep_residual_model.h"
 #include "hsep_settings.h"
 #include "hsep_start.h"
 #include "hsep_uncertainty.h"
+
+/* Model of the residual e_pb = x - x_pb, the paper's or the averaged one: the block holds one of them. */
+typedef struct {
+    hsep_int Np, late, n; /* samples of a window, late samples before it, both */
+    hsep_int planned;     /* whether a compensator decides the commands */
+    hsep_int learning;    /* whether the window is learned */
+    /* Offsets in words from the beginning of the struct; one of them is 0 */
+    hsep_int paper, averaged;
+} hsep_residual_model;
+
+HSEP_ASSERT_WORDS(hsep_residual_model, 7);
 
 struct hsep_predictor {
     hsep_int Np, late, n, preview; /* n = Np + late */
@@ -72,9 +84,19 @@ HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predi
 HSEP_API void hsep_predictor_block_init(
     hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
-/* Parts of the block: the physics model, the residual model, and what is known of the errors of x_h. */
+/* Parts of the block: the physics model; the residual model, NULL if it is the other one; and what is known of the
+ * errors of x_h. */
 static inline hsep_physics *hsep_predictor_physics(hsep_predictor *self) { return hsep_part(self, self->physics); }
-static inline hsep_residual_model *hsep_predictor_model(hsep_predictor *self) { return hsep_part(self, self->model); }
+static inline hsep_paper *hsep_predictor_paper(hsep_predictor *self)
+{
+    hsep_residual_model *model = hsep_part(self, self->model);
+    return model->paper ? hsep_part(model, model->paper) : NULL;
+}
+static inline hsep_averaged *hsep_predictor_averaged(hsep_predictor *self)
+{
+    hsep_residual_model *model = hsep_part(self, self->model);
+    return model->averaged ? hsep_part(model, model->averaged) : NULL;
+}
 static inline hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self)
 {
     return hsep_part(self, self->uncertainty);
@@ -93,8 +115,8 @@ HSEP_API void hsep_predictor_finish(hsep_predictor *self);
 /* Begin a window: commands and weights. */
 HSEP_API void hsep_predictor_begin(hsep_predictor *self);
 
-/* The signals of the window, as its residual model takes them. */
-HSEP_API hsep_residual_window hsep_predictor_window(hsep_predictor *self);
+/* Predict the residuals e_h of samples first ... last - 1 of the n; first is 0, or where the last call ended. */
+HSEP_API void hsep_predictor_predict(hsep_predictor *self, hsep_int first, hsep_int last);
 
 /* Publish the samples of the window up to last - 1, whose x_pb are in past_x and residuals in e_h; eq. (4). */
 HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_int last);

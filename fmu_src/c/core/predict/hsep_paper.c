@@ -24,13 +24,13 @@ HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bi
         .w_x = w_x, .w_e = w_x + (self->q + 1), .p = self->p, .q = self->q, .bias = with_bias ? w[0] : 0.0};
 }
 
-HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_residual_sample *sample)
+HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_real x[], const hsep_real e[])
 {
     hsep_real *row = hsep_regression_row(hsep_paper_regression(self)), *lags = row + 2 + self->q;
     row[0] = 1.0;
-    memcpy(row + 1, sample->x, (size_t)(self->q + 1) * sizeof(hsep_real));
-    memcpy(lags, sample->e + 1, (size_t)self->p * sizeof(hsep_real));
-    row[self->features] = sample->e[0]; /* its target e_pb(k) */
+    memcpy(row + 1, x, (size_t)(self->q + 1) * sizeof(hsep_real));
+    memcpy(lags, e + 1, (size_t)self->p * sizeof(hsep_real));
+    row[self->features] = e[0]; /* its target e_pb(k) */
     hsep_regression_fold(hsep_paper_regression(self));
 }
 

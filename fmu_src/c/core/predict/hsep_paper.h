@@ -35,8 +35,9 @@ HSEP_API void hsep_paper_init(hsep_paper *self, const hsep_predictor_settings *s
 
 static inline hsep_regression *hsep_paper_regression(hsep_paper *self) { return hsep_part(self, self->regression); }
 
-/* Fold the row of a sample into the regression; eqs. (5) and (6). Costs a hsep_regression_fold. */
-HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_residual_sample *sample);
+/* Fold the row of a sample into the regression; eqs. (5) and (6). x, e: m, x_pb and e_pb of the window from this sample
+ * on, and before it. Costs a hsep_regression_fold. */
+HSEP_API void hsep_paper_learn(hsep_paper *self, const hsep_real x[], const hsep_real e[]);
 
 /* The learned recursion, with its bias or without. */
 HSEP_API hsep_recursion hsep_paper_recursion(const hsep_paper *self, int with_bias);

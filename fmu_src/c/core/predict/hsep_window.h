@@ -25,20 +25,4 @@ static inline hsep_int hsep_predicted(const hsep_predictor_parameters *parameter
     return parameters->horizon + hsep_late(&parameters->settings);
 }
 
-typedef struct {
-    const hsep_real *command; /* (n,) m, commands relative to the start */
-    const hsep_real *x_pb;    /* (n + q,) m, physics-based prediction, relative to the start */
-    hsep_real *e;             /* (n + p,) m, residuals as measured; alone the predictor keeps e_h at the same place */
-    hsep_real *e_h;           /* (n + p,) m, residuals as predicted, behind them the measured ones */
-} hsep_residual_window;
-
-/* A sample of it whose measurement came. */
-typedef struct {
-    hsep_int i;             /* sample of the window, 0 ... Np - 1 */
-    hsep_real relative;     /* m, measured position relative to the start */
-    hsep_real command;      /* m, command that came with it, as it came, relative to the start */
-    const hsep_real *x, *e; /* the window's x_pb and e from this sample on, and before it */
-    int settled;            /* whether the window's commands and x_pb will not change any more */
-} hsep_residual_sample;
-
 #endif
