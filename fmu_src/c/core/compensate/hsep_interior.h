@@ -8,7 +8,6 @@
 #ifndef HSEP_INTERIOR_H
 #define HSEP_INTERIOR_H
 
-#include "hsep_knots.h"
 #include "hsep_splines.h"
 
 /* Where the solver ends. */
