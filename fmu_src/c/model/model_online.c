@@ -201,13 +201,8 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
 
 #endif
 
-/* Inputs: they are latched at the instants within a communication step, and executed in the step that reaches the next
- * instant. A step in progress. */
-typedef struct {
-    hsep_clock_step counted;
-    int64_t n_latched, n_executed; /* of the instants that the step has */
-    int pending;                   /* whether the inputs of the next sample are latched */
-} online_step;
+/* Inputs are latched at the instants within a communication step, and executed in the step that reaches the next
+ * instant. */
 
 /* Input at place, m, `after` s into the step; the importer may have set its time derivative. */
 static double online_at(const hsep_context *context, const double values[], size_t place, double after)
@@ -216,25 +211,23 @@ static double online_at(const hsep_context *context, const double values[], size
     return slope == 0.0 ? values[place] : values[place] + slope * after;
 }
 
-/* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. Usage: online_count, then
- * execute a sample while online_next returns 1. may_miss: whether x_meas may be NaN, which is missing. Fails if one of
- * them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant is no communication point;
- * HSEP_WARNED_MOVED: one was taken at a point beside it; or both. */
+/* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. may_miss: whether x_meas may be
+ * NaN, which is missing. Fails if one of them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant is
+ * no communication point; HSEP_WARNED_MOVED: one was taken at a point beside it; or both. */
 static hsep_status online_count(
     const hsep_context *context, const online_inputs *self, const double values[], int may_miss, double t, double h,
-    online_step *step, char message[])
+    hsep_clock_step *counted, char message[])
 {
-    *step = (online_step){.pending = hsep_clock_latched(&self->clock)};
-    if (hsep_check_step(&self->clock, t, h, &step->counted, message) != HSEP_OK) {
+    if (hsep_check_step(&self->clock, t, h, counted, message) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    const hsep_clock_step *counted = &step->counted;
     if (counted->n_latched == 0) {
         return hsep_check_moved(counted, message);
     }
     /* Inputs are linear in time, so the first and the last one, s after the step's start, bound them all. */
     const double last = counted->first + (double)(counted->n_latched - 1) * self->clock.T_s;
-    const double after[2] = {counted->first, last}, sample = (double)(self->clock.k + step->pending);
+    const double after[2] = {counted->first, last};
+    const double sample = (double)(self->clock.k + hsep_clock_latched(&self->clock));
     const double x_load = online_x_load(context, values); /* constant over the step */
     if (hsep_check_position(context, "x_load", x_load, " at sample %.0f", sample, message) != HSEP_OK) {
         return HSEP_REFUSED;
@@ -259,27 +252,6 @@ static hsep_status online_count(
         return status == HSEP_OK ? HSEP_WARNED_LATE : HSEP_WARNED_BOTH;
     }
     return status;
-}
-
-/* Go on in a counted step: return 1 with the next sample to execute in self, 0 when the step is done. */
-static int online_next(const hsep_context *context, online_inputs *self, const double values[], online_step *step)
-{
-    if (!step->pending && step->n_latched < step->counted.n_latched) {
-        const double after = step->counted.first + (double)step->n_latched * self->clock.T_s;
-        self->x_d_ahead = online_at(context, values, HSEP_VR_x_d_ahead, after);
-        self->x_meas = online_at(context, values, HSEP_VR_x_meas, after);
-        self->x_load = online_x_load(context, values);
-        step->pending = 1;
-        step->n_latched++;
-    }
-    if (step->n_executed < step->counted.n_samples) {
-        step->pending = 0;
-        self->clock.k++;
-        step->n_executed++;
-        return 1;
-    }
-    self->clock = step->counted.after;
-    return 0;
 }
 
 /* Both models' ---------------------------------------------------------------------------------------------------- */
@@ -432,7 +404,7 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
     online_state *self = state;
     hsep_predictor *predictor = online_predictor(&self->online);
     const int may_miss = hsep_predictor_averaged(predictor) != NULL;
-    online_step step;
+    hsep_clock_step step;
     if (online_converges(predictor, message) != HSEP_OK) { /* of an earlier step */
         return HSEP_REFUSED;
     }
@@ -441,12 +413,25 @@ hsep_model_step(const hsep_context *context, void *state, double values[], doubl
         return HSEP_REFUSED;
     }
     online_tune(&self->online, values);
-    while (online_next(context, &self->inputs, values, &step)) {
-        online_sample(&self->online, &self->inputs);
+    online_inputs *inputs = &self->inputs;
+    const int64_t latched = hsep_clock_latched(&inputs->clock); /* the first sample's inputs, by the last step */
+    for (int64_t n = 0; n <= step.n_samples; n++) {
+        if (n >= latched && n - latched < step.n_latched) {
+            const double after = step.first + (double)(n - latched) * inputs->clock.T_s;
+            inputs->x_d_ahead = online_at(context, values, HSEP_VR_x_d_ahead, after);
+            inputs->x_meas = online_at(context, values, HSEP_VR_x_meas, after);
+            inputs->x_load = online_x_load(context, values);
+        }
+        if (n == step.n_samples) {
+            break;
+        }
+        inputs->clock.k++;
+        online_sample(&self->online, inputs);
         if (online_converges(predictor, message) != HSEP_OK) {
             return HSEP_REFUSED;
         }
     }
+    inputs->clock = step.after;
     online_write(&self->online, values);
     return status;
 }

@@ -1,8 +1,7 @@
 /* Parameters of a predictor and its models; signals of a window whose residual a model predicts, and learns from.
  *
- * Signals are kept newest first: of the n samples that are predicted, late ones and a window or a preview, sample k is at
- * place n - 1 - k, and what was before them is behind them; the first Np are measured when the window ends.
- */
+ * Signals are kept newest first: of the n samples that are predicted, late ones and a window or a preview, sample k is
+ * at place n - 1 - k, and what was before them is behind them; the first Np are measured when the window ends. */
 #ifndef HSEP_WINDOW_H
 #define HSEP_WINDOW_H
 
