@@ -57,8 +57,8 @@ def together(*changes: Changes) -> Changes:
 
 def without_component(i: int) -> Changes:
     """Return intervals without one of their components."""
-    last = "    f[2] = stacked ? signals->variance[j] : 0.0;"
-    return {"predict/hsep_uncertainty.c": [(last, f"{last}\n    f[{i}] = 0.0;")]}
+    last = "        f[2] = variance != NULL && k >= n_physics ? variance[j] : 0.0;"
+    return {"predict/hsep_uncertainty.c": [(last, f"{last}\n        f[{i}] = 0.0;")]}
 
 
 NO_DOUBTING: Changes = {
@@ -68,7 +68,7 @@ NO_DOUBTING: Changes = {
             "known[hsep_averaged_kind_of(self, i)] && i != HSEP_FRESH_START &&",
         )
     ],
-    STATE: [("        hsep_stack_copy(&learned->stack, self->leading, HSEP_FRESH_START);\n", "")],
+    STATE: [("            hsep_stack_copy(&learned->stacks[i], self->leading, HSEP_FRESH_START);\n", "")],
     **constants(discard_above=2.0),
 }
 

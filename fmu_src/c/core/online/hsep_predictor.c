@@ -243,13 +243,12 @@ HSEP_API hsep_int hsep_predictor_warm_up(const hsep_predictor *self, hsep_int la
 HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_int first, hsep_int last)
 {
     hsep_averaged *averaged = hsep_predictor_averaged(self);
-    const hsep_uncertainty_signals signals = {
-        .x_pb = hsep_at(self, self->past_x),
-        .e_h = hsep_at(self, self->e_h),
-        .n_physics = hsep_predictor_warm_up(self, self->late),
-        .variance = averaged != NULL ? hsep_at(averaged, averaged->variance) + (averaged->n - self->n) : NULL};
+    const hsep_real *variance =
+        averaged != NULL ? hsep_at(averaged, averaged->variance) + (averaged->n - self->n) : NULL;
     if (self->divergence == HSEP_CONVERGES) {
-        hsep_uncertainty_predict(hsep_predictor_uncertainty(self), &signals, first, last);
+        hsep_uncertainty_predict(
+            hsep_predictor_uncertainty(self), hsep_at(self, self->past_x), hsep_at(self, self->e_h), variance,
+            hsep_predictor_warm_up(self, self->late), first, last);
     }
 }
 

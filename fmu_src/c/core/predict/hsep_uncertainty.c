@@ -42,24 +42,9 @@ static hsep_real uncertainty_from_middle(const hsep_uncertainty *self, hsep_int 
     return hsep_fmin(((hsep_real)k + 0.5) / (hsep_real)self->Np, 1.0) - 0.5;
 }
 
-/* Components of the variance at place j, as they are at once. */
-static void uncertainty_at(
-    const hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_int j,
-    hsep_real f[HSEP_UNCERTAINTY_N_COMPONENTS])
-{
-    const hsep_real *x_pb = signals->x_pb;
-    const hsep_int n = self->n;
-    /* The first sample has the difference of the second. */
-    const hsep_int newer = j + 1 == n && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
-    const int stacked = signals->variance != NULL && n - 1 - j >= signals->n_physics;
-    f[0] = 1.0;
-    const hsep_real change = hsep_fmin(hsep_fabs(x_pb[newer] - x_pb[older]), HSEP_PREDICTION_MAX);
-    f[1] = change * change;
-    f[2] = stacked ? signals->variance[j] : 0.0;
-}
-
 HSEP_API void hsep_uncertainty_predict(
-    hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_int first, hsep_int last)
+    hsep_uncertainty *self, const hsep_real x_pb[], const hsep_real e_h[], const hsep_real variance[],
+    hsep_int n_physics, hsep_int first, hsep_int last)
 {
     const hsep_int n = self->n;
     const hsep_real gain = 1.0 / (1.0 + HSEP_UNCERTAINTY_FELT_FOR * (hsep_real)self->Np);
@@ -68,15 +53,21 @@ HSEP_API void hsep_uncertainty_predict(
         memset(felt, 0, sizeof self->felt);
     }
     for (hsep_int k = first; k < last; k++) { /* in time, from the last measured sample on */
-        published[n - 1 - k] = k < signals->n_physics ? 0.0 : signals->e_h[n - 1 - k];
-        hsep_real *f = hsep_at(self, self->components) + (n - 1 - k) * HSEP_UNCERTAINTY_N_COMPONENTS;
-        uncertainty_at(self, signals, n - 1 - k, f);
+        const hsep_int j = n - 1 - k;
+        /* The first sample has the difference of the second. */
+        const hsep_int newer = k == 0 && j > 0 ? j - 1 : j, older = newer + 1 < n ? newer + 1 : newer;
+        const hsep_real change = hsep_fmin(hsep_fabs(x_pb[newer] - x_pb[older]), HSEP_PREDICTION_MAX);
+        hsep_real *f = hsep_at(self, self->components) + j * HSEP_UNCERTAINTY_N_COMPONENTS;
+        published[j] = k < n_physics ? 0.0 : e_h[j];
+        f[0] = 1.0;
+        f[1] = change * change;
+        f[2] = variance != NULL && k >= n_physics ? variance[j] : 0.0;
         for (int i = 1; i < HSEP_UNCERTAINTY_N_COMPONENTS; i++) { /* all but the noise */
             felt[i] += gain * (f[i] - felt[i]);
             f[i] = felt[i];
         }
         const hsep_real c = self->factor * hsep_pow(self->ratio, uncertainty_from_middle(self, k));
-        std[n - 1 - k] = hsep_fmin(c * hsep_sqrt(uncertainty_variance(self, f)), HSEP_PREDICTION_MAX);
+        std[j] = hsep_fmin(c * hsep_sqrt(uncertainty_variance(self, f)), HSEP_PREDICTION_MAX);
     }
 }
 

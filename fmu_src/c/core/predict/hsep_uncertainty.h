@@ -39,18 +39,12 @@ HSEP_API hsep_real hsep_uncertainty_first_variance(hsep_real lambda, hsep_real n
 /* Fill the block. variance: that first one. */
 HSEP_API void hsep_uncertainty_init(hsep_uncertainty *self, hsep_int Np, hsep_int n, hsep_real variance);
 
-/* Signals that tell of a prediction's error. */
-typedef struct {
-    const hsep_real *x_pb;     /* (n,) m, physics-based prediction */
-    const hsep_real *e_h;      /* (n,) m, predicted residual */
-    hsep_int n_physics;        /* leading samples where it is not published */
-    const hsep_real *variance; /* (n,) m2, what the residual model knows of its error, or NULL */
-} hsep_uncertainty_signals;
-
 /* Predict the errors of samples first ... last - 1; first is 0, or where the last call ended. The first samples are at
- * least two, or n, as differences are taken. */
+ * least two, or n, as differences are taken. x_pb, e_h: (n,) m, physics-based prediction and predicted residual, which
+ * is not published in n_physics leading samples; variance: (n,) m2, what is known of its error, or NULL. */
 HSEP_API void hsep_uncertainty_predict(
-    hsep_uncertainty *self, const hsep_uncertainty_signals *signals, hsep_int first, hsep_int last);
+    hsep_uncertainty *self, const hsep_real x_pb[], const hsep_real e_h[], const hsep_real variance[],
+    hsep_int n_physics, hsep_int first, hsep_int last);
 
 /* Learn from the measured residuals e, (Np,), m, of its first samples; accepted: (Np,), 1 where they count, or NULL for
  * all of them. */
