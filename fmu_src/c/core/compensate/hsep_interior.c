@@ -53,36 +53,6 @@ static void slacks_give_rows(const slacks *self, const hsep_real *y, hsep_real s
     }
 }
 
-/* Begin with B x in ds, and a complementarity mu, m2. */
-static void slacks_begin(const slacks *self, hsep_real mu)
-{
-    for (hsep_int r = 0; r < self->n; r++) {
-        self->s[r] = hsep_fmax(self->ds[r] - self->b[r], HSEP_QP_FIRST_SLACK);
-        self->z[r] = mu / self->s[r];
-        self->inverse[r] = 1.0 / (self->s[r] + self->rho * self->z[r]);
-    }
-}
-
-/* Rows of A' := B' of r_c - z r_p / (s + rho z), what the bounds add to the dual residual on the right-hand side. */
-static void slacks_push(const slacks *self)
-{
-    const slacks it = *self;
-    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
-        AT(ds) = AT(r_c) - AT(z) * AT(inverse) * AT(r_p);
-    }
-    slacks_give_rows(self, it.ds, -1.0);
-}
-
-/* Rows := weights W of A' W A. */
-static void slacks_weigh(const slacks *self)
-{
-    const slacks it = *self;
-    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
-        AT(ds) = AT(z) * AT(inverse);
-    }
-    slacks_give_rows(self, it.ds, 1.0);
-}
-
 /* Steps of B dx in ds, ds = B dx + r_p + rho dz and dz = r_c - z (B dx + r_p) / (s + rho z), and their lengths to where
  * all values + length change stay >= 0: the largest -change / value is its inverse. */
 static slacks_step_lengths slacks_lengths(const slacks *self)
@@ -130,15 +100,6 @@ static hsep_real slacks_predicted(const slacks *self)
         sums[r % 2] += (it.s[r] + alpha.primal * it.ds[r]) * (it.z[r] + alpha.dual * it.dz[r]);
     }
     return (sums[0] + sums[1]) / (hsep_real)it.n;
-}
-
-/* The corrector's r_c: the centre sigma mu, with the curvature ds dz that the predictor shows. */
-static void slacks_correct(const slacks *self, hsep_real sigma_mu)
-{
-    const slacks it = *self;
-    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
-        AT(r_c) = (sigma_mu - AT(s) * AT(z) - AT(ds) * AT(dz)) * AT(inverse);
-    }
 }
 
 /* Go by the corrector's step, as far as s and z stay > 0; return the primal length. */
@@ -267,7 +228,12 @@ HSEP_API void hsep_interior_begin(
     a.slacks.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
     slacks_take_rows(&a.slacks, a.slacks.rows, a.slacks.work, a.slacks.b);
     interior_rows(&a, a.problem.x);
-    slacks_begin(&a.slacks, self->tolerance.first_mu * self->cost);
+    const slacks it = a.slacks;
+    for (hsep_int r = 0; r < it.n; r++) {
+        it.s[r] = hsep_fmax(it.ds[r] - it.b[r], HSEP_QP_FIRST_SLACK);
+        it.z[r] = self->tolerance.first_mu * self->cost / it.s[r];
+        it.inverse[r] = 1.0 / (it.s[r] + it.rho * it.z[r]);
+    }
 }
 
 /* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its terms. */
@@ -294,10 +260,14 @@ static hsep_real interior_dual_residual(const interior_arrays *a, const hsep_rea
     return residual / largest;
 }
 
-/* dx := (P + A' W A)^-1 (r_d + B' push), and B dx. */
+/* dx := (P + A' W A)^-1 (r_d + B' (r_c - z r_p / (s + rho z))), and B dx. */
 static void interior_direction(const interior_arrays *a)
 {
-    slacks_push(&a->slacks);
+    const slacks it = a->slacks;
+    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+        AT(ds) = AT(r_c) - AT(z) * AT(inverse) * AT(r_p);
+    }
+    slacks_give_rows(&it, it.ds, -1.0);
     memcpy(a->dx, a->r_d, (size_t)a->n * sizeof(hsep_real));
     interior_transpose(a, a->dx);
     hsep_cholesky_solve(a->factor, a->n, a->dx);
@@ -330,7 +300,11 @@ static int interior_factor(const interior_arrays *a, const hsep_real P[], hsep_i
     const hsep_int panel = HSEP_CHOLESKY_PANEL, ends[] = {0, a->n / 12 / panel * panel, a->n / 4 / panel * panel, a->n};
     if (part == 0) {
         memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
-        slacks_weigh(&a->slacks);
+        const slacks it = a->slacks;
+        for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* the weights W */
+            AT(ds) = AT(z) * AT(inverse);
+        }
+        slacks_give_rows(&it, it.ds, 1.0);
         hsep_splines_gram(a->splines, a->slacks.rows, a->first, a->problem.products, a->slacks.work);
         hsep_knots_add(a->knots, a->problem.products, a->factor, a->problem.c);
     }
@@ -348,8 +322,12 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a);
     if (part == 4) {
-        const hsep_real mu = self->mu, ratio = slacks_predicted(&a.slacks) / mu; /* mu_aff / mu; sigma = ratio^3 */
-        slacks_correct(&a.slacks, hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost));
+        const slacks it = a.slacks;
+        const hsep_real mu = self->mu, ratio = slacks_predicted(&it) / mu; /* mu_aff / mu; sigma = ratio^3 */
+        const hsep_real centre = hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost);
+        for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* with the curvature ds dz that the predictor shows */
+            AT(r_c) = (centre - AT(s) * AT(z) - AT(ds) * AT(dz)) * AT(inverse);
+        }
         return 0;
     }
     hsep_axpy(a.problem.x, slacks_move(&a.slacks), a.dx, a.n);
