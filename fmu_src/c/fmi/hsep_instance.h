@@ -76,7 +76,6 @@ typedef struct {
     double stop_time;  /* s */
     double time;       /* s, where the last step ended */
 } hsep_experiment;
-
 HSEP_ASSERT_WORDS(hsep_experiment, 4);
 
 /* Hands a message to the importer's logger, which is not NULL; the numbers of statuses are the same in all versions. */

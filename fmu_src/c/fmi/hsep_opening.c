@@ -129,7 +129,6 @@ typedef struct {
     char guid[HSEP_GUID_SIZE]; /* padded with zeros */
     double starts[];           /* of all but the windows; the CRC-32 of all before as uint64 */
 } opening_table;
-
 HSEP_ASSERT_WORDS(opening_table, 12);
 
 /* Check a table of size bytes, and fill the context with what it tells. reason: what is wrong with it. */

@@ -24,7 +24,6 @@ typedef struct {
     hsep_experiment experiment;
     uint64_t state_size; /* bytes of the model's state */
 } saved_header;
-
 HSEP_ASSERT_WORDS(saved_header, 15);
 
 /* What an importer's handle points to. */

@@ -31,7 +31,6 @@ typedef struct {
     double x_d_ahead, x_meas, x_load; /* m */
     double nothing;                   /* what follows the struct begins at a multiple of 16 bytes */
 } online_inputs;
-
 HSEP_ASSERT_WORDS(online_inputs, 9);
 
 typedef struct {

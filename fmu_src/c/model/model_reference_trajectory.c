@@ -33,7 +33,6 @@ typedef struct {
     uint64_t count;
     double T_s; /* s */
 } trajectory_head;
-
 HSEP_ASSERT_WORDS(trajectory_head, 3);
 
 /* Position at sample k >= 0, m: the last sample is held. */

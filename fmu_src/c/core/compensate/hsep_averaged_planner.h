@@ -73,7 +73,6 @@ typedef struct {
     hsep_int physics; /* G_pb at the beginning of the window, */
     hsep_int trial;   /* and for a trial */
 } hsep_averaged_planner;
-
 HSEP_ASSERT_WORDS(hsep_averaged_planner, 45);
 
 /* What it plans with: other blocks, and the window's data. */

@@ -66,7 +66,6 @@ struct hsep_compensator {
     hsep_int planner, predictor;
     hsep_int averaged; /* the planner on the residual model with averaging; 0: the paper's */
 };
-
 HSEP_ASSERT_WORDS(hsep_compensator, 23);
 
 HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters);

@@ -32,7 +32,6 @@ typedef struct {
     hsep_real beyond; /* shares, by how much inner exceeds the worst bound; the margin: there is none */
     /* followed by arrays, see interior_lay_out */
 } hsep_interior;
-
 HSEP_ASSERT_WORDS(hsep_interior, 20);
 
 HSEP_API hsep_real hsep_interior_size(hsep_int preview, hsep_int n); /* bytes of the block, counted as a number */

@@ -41,7 +41,6 @@ typedef struct {
     hsep_int physics;     /* G_pb at rest, */
     hsep_int filters;     /* and of each column */
 } hsep_linearised;
-
 HSEP_ASSERT_WORDS(hsep_linearised, 20);
 
 HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_predictor_parameters *parameters);

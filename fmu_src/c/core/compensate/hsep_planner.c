@@ -23,7 +23,6 @@ typedef struct {
     hsep_int low, high;            /* bounds of the rows of a change, */
     hsep_int start, way, own_rows; /* the last stop without its own part, the way to the plan's, and that part */
 } hsep_stop;
-
 HSEP_ASSERT_WORDS(hsep_stop, 13);
 
 HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters)

@@ -45,7 +45,6 @@ typedef struct {
     hsep_knots solved; /* and those of this cost */
     hsep_int stop;     /* of plans that are longer than what is known; 0: none is */
 } hsep_planner;
-
 HSEP_ASSERT_WORDS(hsep_planner, 40);
 
 /* The splines of a plan; hsep_splines_shape is to be filtered. */

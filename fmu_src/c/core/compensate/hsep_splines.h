@@ -22,7 +22,6 @@ typedef struct {
     hsep_int shape;                    /* (4 spacing,) b */
     hsep_int differences[HSEP_ORDERS]; /* (4 spacing + 3,) of each order, in shares */
 } hsep_splines;
-
 HSEP_ASSERT_WORDS(hsep_splines, 12);
 
 /* Differences of orders 0 to 3 at a sample with this value, from those at the sample before, in place. */
@@ -111,7 +110,6 @@ typedef struct {
     hsep_int count[HSEP_KNOTS_LEVELS]; /* of each level, */
     hsep_int begin[HSEP_KNOTS_LEVELS]; /* which begins with that uniform spline */
 } hsep_knots;
-
 HSEP_ASSERT_WORDS(hsep_knots, 9);
 
 /* A spline that is solved for: share[i], i < length, of the uniform splines begin + i. */

@@ -101,7 +101,6 @@ typedef struct {
     uint64_t seed;
     uint64_t n_draws; /* so far, 0 in the beginning */
 } hsep_encoder;
-
 HSEP_ASSERT_WORDS(hsep_encoder, 3);
 
 /* Return one measurement of the position x, m. Constant cost; cannot fail. */

@@ -20,7 +20,6 @@ typedef struct {
     hsep_int sums;    /* triangle of n + 1 rows: sums of products of entries, from the diagonal to the right, */
     hsep_int carries; /* and what rounding took from them */
 } hsep_gram;
-
 HSEP_ASSERT_WORDS(hsep_gram, 6);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */

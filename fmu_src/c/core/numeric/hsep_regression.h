@@ -23,7 +23,6 @@ typedef struct {
     hsep_int factor;    /* (n (n + 1) / 2,) U and z, by rows, from behind the diagonal on */
     hsep_int carries;   /* (n (n + 1) / 2,) what rounding took from them */
 } hsep_regression;
-
 HSEP_ASSERT_WORDS(hsep_regression, 6);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */

@@ -50,7 +50,6 @@ typedef struct {
     hsep_int work;      /* (HSEP_SOLUTION_ABREAST, n_head + n_tail + 1) rows */
     hsep_int abreast;   /* the same side by side, where there are vectors */
 } hsep_solution;
-
 HSEP_ASSERT_WORDS(hsep_solution, 16);
 
 /* Bytes of the block, counted as a number so that no size can overflow: about 4 n^2. */

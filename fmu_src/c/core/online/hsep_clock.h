@@ -21,7 +21,6 @@ typedef struct {
     double carry; /* s, accumulated rounding error of since */
     double end;   /* s, end of the last step in the importer's time */
 } hsep_clock;
-
 HSEP_ASSERT_WORDS(hsep_clock, 5);
 
 /* One communication step in samples. */

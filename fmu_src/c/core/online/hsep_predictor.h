@@ -42,7 +42,6 @@ typedef struct {
     /* Offsets in words from the beginning of the struct; one of them is 0 */
     hsep_int paper, averaged;
 } hsep_residual_model;
-
 HSEP_ASSERT_WORDS(hsep_residual_model, 7);
 
 struct hsep_predictor {
@@ -76,7 +75,6 @@ struct hsep_predictor {
     hsep_int model;  /* the residual model */
     hsep_int motion; /* the motion before the run; with averaging, alone */
 };
-
 HSEP_ASSERT_WORDS(hsep_predictor, 35);
 
 HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters);

@@ -26,7 +26,6 @@ typedef struct {
     hsep_int weights; /* (features,) w */
     hsep_int regression;
 } hsep_paper;
-
 HSEP_ASSERT_WORDS(hsep_paper, 5);
 
 HSEP_API hsep_real hsep_paper_lay_out(hsep_paper *self, const hsep_predictor_settings *settings);

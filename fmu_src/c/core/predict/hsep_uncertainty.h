@@ -27,7 +27,6 @@ typedef struct {
     hsep_int components; /* (n, HSEP_UNCERTAINTY_N_COMPONENTS) m2 but for the first, which is 1 */
     hsep_int std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;
-
 HSEP_ASSERT_WORDS(hsep_uncertainty, 6 + HSEP_UNCERTAINTY_N_COMPONENTS + HSEP_N_UNCERTAINTY);
 
 HSEP_API hsep_real hsep_uncertainty_lay_out(hsep_uncertainty *self, hsep_int Np, hsep_int n);

@@ -117,7 +117,6 @@ typedef struct {
                         * fewer samples */
     hsep_int rows;     /* (n, HSEP_COMMAND_FEATURES), sample after sample */
 } hsep_command;
-
 HSEP_ASSERT_WORDS(hsep_command, 5);
 
 /* It is all that a block of 0 needs to be at rest. */

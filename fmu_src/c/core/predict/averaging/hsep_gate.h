@@ -14,7 +14,6 @@ typedef struct {
     hsep_real fastest;  /* m, largest change of x_pb from sample to sample so far, of the window, too */
     hsep_int known;     /* whether there was a motion, and a residual, before the window */
 } hsep_gate;
-
 HSEP_ASSERT_WORDS(hsep_gate, 6);
 
 /* Begin a window. largest: m, the largest residual believed before it; fastest: m. */

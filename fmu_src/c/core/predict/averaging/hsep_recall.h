@@ -29,7 +29,6 @@ typedef struct {
     hsep_int residuals; /* (size,) m, ring */
     hsep_int distances; /* (size,) m2, of the lags 1 ... size */
 } hsep_recall;
-
 HSEP_ASSERT_WORDS(hsep_recall, 16);
 
 /* It is all that a block of 0 needs to be at rest. */

@@ -19,7 +19,6 @@ typedef struct {
     hsep_int weights;           /* (n_states,) m, change of the state */
     hsep_int trial, regression; /* the physics model on its own; least squares */
 } hsep_start;
-
 HSEP_ASSERT_WORDS(hsep_start, 11);
 
 HSEP_API hsep_real hsep_start_lay_out(hsep_start *self, const hsep_predictor_parameters *parameters);

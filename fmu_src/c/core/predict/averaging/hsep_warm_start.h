@@ -8,7 +8,6 @@
 typedef struct {
     hsep_int of_run, earlier; /* offsets in words: Gram matrices; one whose n_rows are 0 has no rows */
 } hsep_warm_start;
-
 HSEP_ASSERT_WORDS(hsep_warm_start, 2);
 
 static inline hsep_gram *hsep_warm_start_of_run(hsep_warm_start *self) { return hsep_part(self, self->of_run); }
