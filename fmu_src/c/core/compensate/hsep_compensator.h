@@ -1,21 +1,15 @@
 /* Servo error pre-compensation, sample by sample: a predictor (hsep_predictor.h) with commands modified by a planner
  * (hsep_planner.h); eqs. (2) to (6).
  *
- * Sample k brings x_d_ahead = r(k) and x_meas = x(k); after it the outputs belong to k + 1. When k + 1 is a multiple of
- * Np, the whole preview of the next window and every measurement before it have arrived: the weights are solved and the
- * window is planned in that sample. A plan that the drive's limits bound is solved over the samples that follow, while
- * the command follows the last plan. With averaging every plan is solved so, over HSEP_PLANNING_PINNED_AVERAGED
- * samples: each of these does an equal share of the work that may be left, counted in multiply-adds
- * (hsep_averaged_planner_run).
+ * A window is planned in the sample in which it is predicted. A plan that the drive's limits bound is solved over the
+ * samples that follow, while the command follows the last plan. With averaging every plan is solved so, over
+ * HSEP_PLANNING_PINNED_AVERAGED samples (hsep_averaged_planner_run).
  *
  * Cost of a sample, with n features and m splines in a plan: as much as hsep_regression_fold(n). The end of a window
  * costs on top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two terms
  * twice if the hybrid plan fails, and a copy of the dead time. While a plan is being solved, each of the 8 samples that
  * follow calls hsep_interior_advance six times; where fewer than 8 samples are pinned (Np < 16, or spacing > 8), more
  * often, or 2 HSEP_QP_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real time.
- *
- * With averaging a late measurement adds late^2 / 2 multiply-adds for each expert in two samples of a window:
- * negligible up to 100 samples, 2 ms on a desktop's core for 1000.
  *
  * A block as hsep_layout.h has them. Once the parameters are in range nothing here fails but the prediction of a
  * window, as in hsep_predictor.h.

@@ -1,13 +1,9 @@
-/* Hybrid predictor, sample by sample; eqs. (2) to (6).
+/* Hybrid predictor, sample by sample (hsep.h says what one brings); eqs. (2) to (6).
  *
- * It is the look-ahead buffer between the interpolator and the drive: sample k brings x_d_ahead = r(k) and x_meas =
- * x(k); after it the outputs belong to k + 1, and x_d(k) = r(k - preview). When k + 1 is a multiple of Np, the next
- * window and every measurement before it have arrived: the weights are solved and the window is predicted in that
- * sample. Over the first fill (k < preview) the commanded position is the start; what is measured then is not learned.
- *
- * Where the measurement is late by some samples, x_meas = x(k - late): the late samples before a window, which are not
- * measured yet, are predicted with it: n = Np + late samples. The first Np of these are learned when the window ends.
- * A measurement that comes a sample early, x_meas = x(k + 1), is held for one sample.
+ * When k + 1 is a multiple of Np, the next window and every measurement before it have arrived: the weights are solved
+ * and the window is predicted in that sample. What is measured over the first fill (k < preview) is not learned. Where
+ * measurements are late, the late samples before a window, which are not measured yet, are predicted with it: n = Np +
+ * late samples. The first Np of these are learned when the window ends.
  *
  * Alone (hsep_predictor_sample, preview = Np) it predicts under the commands as they came. A compensator, which decides
  * the commands of a window, calls the parts in this order: hsep_predictor_take_in at each sample; at the end of a
