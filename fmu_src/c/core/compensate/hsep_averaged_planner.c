@@ -65,7 +65,7 @@ static void averaged_planner_command(
     for (hsep_int k = 0; k < self->preview; k++) {
         const hsep_int j = self->preview - 1 - k;
         command[j] = task->x_d[k] - task->predictor->start + hsep_splines_sum(splines, c, count, k) + task->load[k];
-        hsep_physics_forced_response(trial, &command[j], &x_pb[j], 1);
+        x_pb[j] = hsep_physics_respond(trial, command[j]);
     }
 }
 

@@ -50,8 +50,9 @@ HSEP_API void hsep_compensator_block_init(
     hsep_physics *trial = compensator_trial(self);
     hsep_real *spline = hsep_at(self, self->spline_pb);
     const hsep_splines *splines = hsep_planner_splines(hsep_compensator_planner(self));
-    memcpy(spline, hsep_splines_shape(splines), (size_t)(4 * splines->spacing) * sizeof(hsep_real));
-    hsep_physics_forced_response(trial, spline, spline, (size_t)predictor->horizon);
+    for (hsep_int k = 0; k < predictor->horizon; k++) {
+        spline[k] = hsep_physics_respond(trial, k < 4 * splines->spacing ? hsep_splines_shape(splines)[k] : 0.0);
+    }
     if (self->averaged) {
         hsep_averaged_planner_init(
             hsep_compensator_averaged(self), predictor, &parameters->planner, hsep_compensator_planner(self), spline);
@@ -87,8 +88,7 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
     hsep_physics *trial = compensator_trial(self);
     for (hsep_int k = 0; k < horizon; k++) {
         const hsep_real decided = hsep_splines_sum(hsep_planner_splines(planner), c, HSEP_N_DECIDED, k);
-        const hsep_real command = x_d[k] - predictor->start + decided + load[k];
-        hsep_physics_forced_response(trial, &command, &x[horizon - 1 - k], 1);
+        x[horizon - 1 - k] = hsep_physics_respond(trial, x_d[k] - predictor->start + decided + load[k]);
         target[k] = x_d[k] - predictor->start - x[horizon - 1 - k];
     }
     if (state == HSEP_SEP_HYBRID) {
@@ -168,7 +168,7 @@ static void compensator_publish(hsep_compensator *self, hsep_int last)
     for (hsep_int k = first; k < last; k++) {
         x_dm[k] = x_d[k] + hsep_planner_delta(hsep_compensator_planner(self), k);
         command[Np - 1 - k] = x_dm[k] - predictor->start + load[k];
-        hsep_physics_forced_response(hsep_predictor_physics(predictor), &command[Np - 1 - k], &past_x[Np - 1 - k], 1);
+        past_x[Np - 1 - k] = hsep_physics_respond(hsep_predictor_physics(predictor), command[Np - 1 - k]);
     }
     if (!hsep_within(x_dm + first, last - first, HSEP_PREDICTION_MAX)) {
         predictor->divergence = HSEP_DIVERGES_X_DM;

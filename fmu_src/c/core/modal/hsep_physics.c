@@ -81,8 +81,6 @@ HSEP_API void hsep_discretise(hsep_discrete_mode *mode, const hsep_mode *continu
     mode->s[0] = mode->s[1] = 0.0;
 }
 
-#define PHYSICS_TOGETHER 64 /* samples whose response is computed mode by mode */
-
 HSEP_API hsep_real hsep_physics_lay_out(hsep_physics *self, const hsep_predictor_parameters *parameters)
 {
     hsep_real end = HSEP_WORDS(hsep_physics);
@@ -137,37 +135,19 @@ static hsep_real physics_delay(hsep_physics *self, hsep_real u)
     return delayed;
 }
 
-/* Add the response of one mode to commands u, (n,), its state in registers. */
-static void physics_respond(hsep_discrete_mode *m, const hsep_real *restrict u, hsep_real *restrict x_pb, size_t n)
+HSEP_API hsep_real hsep_physics_respond(hsep_physics *self, hsep_real x_d)
 {
-    const hsep_real a00 = m->A[0], a01 = m->A[1], a10 = m->A[2], a11 = m->A[3], b0 = m->b[0], b1 = m->b[1];
-    const hsep_real c0 = m->c[0], c1 = m->c[1], d = m->d;
-    hsep_real s0 = m->s[0], s1 = m->s[1];
-    for (size_t k = 0; k < n; k++) {
-        /* x_pb = c s + d u */
-        x_pb[k] += c0 * s0 + c1 * s1 + d * u[k];
-        /* s := A s + b u */
-        const hsep_real next = a00 * s0 + a01 * s1 + b0 * u[k];
-        s1 = a10 * s0 + a11 * s1 + b1 * u[k];
-        s0 = next;
+    const hsep_real u = self->dead_time > 0 ? physics_delay(self, x_d) : x_d;
+    hsep_real x_pb = 0.0;
+    for (hsep_int i = 0; i < self->n_modes; i++) {
+        hsep_discrete_mode *m = &physics_modes(self)[i];
+        const hsep_real s0 = m->s[0], s1 = m->s[1];
+        /* x_pb = c s + d u,  s := A s + b u */
+        x_pb += m->c[0] * s0 + m->c[1] * s1 + m->d * u;
+        m->s[0] = m->A[0] * s0 + m->A[1] * s1 + m->b[0] * u;
+        m->s[1] = m->A[2] * s0 + m->A[3] * s1 + m->b[1] * u;
     }
-    m->s[0] = s0;
-    m->s[1] = s1;
-}
-
-HSEP_API void hsep_physics_forced_response(hsep_physics *self, const hsep_real x_d[], hsep_real x_pb[], size_t n)
-{
-    hsep_real u[PHYSICS_TOGETHER]; /* x_pb may be x_d */
-    for (size_t first = 0; first < n; first += PHYSICS_TOGETHER) {
-        const size_t count = n - first < PHYSICS_TOGETHER ? n - first : PHYSICS_TOGETHER;
-        for (size_t k = 0; k < count; k++) {
-            u[k] = self->dead_time > 0 ? physics_delay(self, x_d[first + k]) : x_d[first + k];
-        }
-        memset(x_pb + first, 0, count * sizeof(hsep_real));
-        for (hsep_int i = 0; i < self->n_modes; i++) {
-            physics_respond(&physics_modes(self)[i], u, x_pb + first, count);
-        }
-    }
+    return x_pb;
 }
 
 /* Add the responses of one mode of count models to n samples of the signals u, their states in registers: a function

@@ -293,9 +293,8 @@ static void predictor_go_on(hsep_predictor *self)
 HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas)
 {
     const hsep_int Np = self->Np;
-    const hsep_real relative = x_d_ahead - self->start;
     hsep_real *ahead_pb = hsep_at(self, self->ahead_pb);
-    hsep_physics_forced_response(hsep_predictor_physics(self), &relative, ahead_pb + self->k % Np, 1);
+    ahead_pb[self->k % Np] = hsep_physics_respond(hsep_predictor_physics(self), x_d_ahead - self->start);
     if (!hsep_predictor_take_in(self, x_d_ahead, x_meas, 1)) {
         if (self->n_published < Np) {
             predictor_go_on(self);

@@ -51,8 +51,7 @@ static void start_respond(hsep_start *self, hsep_real step, hsep_real x_pb[], hs
     const hsep_int late = self->n - self->Np;
     hsep_physics_begin(trial, hsep_at(self, self->state));
     for (hsep_int k = 0; k < count; k++) {
-        const hsep_real x_d = k < late ? -step * (hsep_real)(late - k) : 0.0;
-        hsep_physics_forced_response(trial, &x_d, x_pb + k, 1);
+        x_pb[k] = hsep_physics_respond(trial, k < late ? -step * (hsep_real)(late - k) : 0.0);
     }
 }
 
