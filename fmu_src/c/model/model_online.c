@@ -11,7 +11,6 @@
 #include "hsep_check.h"
 #include "hsep_compensator.h"
 #include "hsep_learned.h"
-#include "hsep_parameters.h"
 #include "hsep_table.h"
 #include "hsep_windows.h"
 

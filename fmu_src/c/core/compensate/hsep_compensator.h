@@ -62,6 +62,7 @@ struct hsep_compensator {
 };
 HSEP_ASSERT_WORDS(hsep_compensator, 23);
 
+HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_parameters *parameters);
 HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. hsep_compensator_begin has to follow. */
 HSEP_API void hsep_compensator_block_init(

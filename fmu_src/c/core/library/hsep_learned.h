@@ -7,7 +7,6 @@
 #ifndef HSEP_LEARNED_H
 #define HSEP_LEARNED_H
 
-#include "hsep_parameters.h"
 #include "hsep_predictor.h"
 
 #define HSEP_LEARNED_MAGIC "HSEPWG15"

@@ -1,7 +1,6 @@
 /* The library's compensator: its size and beginning from the settings; the rest is hsep_compensator.c's. */
 #include "hsep_compensator.h"
 #include "hsep_learned.h"
-#include "hsep_parameters.h"
 
 HSEP_API size_t hsep_compensator_size(const hsep_parameters *parameters)
 {

@@ -1,8 +1,6 @@
 /* The library's predictor: its size and beginning from the settings; the rest is hsep_predictor.c's, and
  * hsep_learned.c's. */
 #include "hsep_learned.h"
-#include "hsep_parameters.h"
-#include "hsep_predictor.h"
 
 HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters)
 {

@@ -1,4 +1,5 @@
-#include "hsep_parameters.h"
+/* Parameters of the library: their ranges, and what predictor and compensator derive from them. */
+#include "hsep_compensator.h"
 
 static const hsep_real parameters_warm_up_tolerance = 1e-6; /* samples: rounding of times cannot tell */
 static const hsep_real parameters_warm_up = 0.3;            /* s, where it is automatic, without averaging */
@@ -131,5 +132,3 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
     derived.n_lost = (hsep_int)parameters_samples(settings->measurement_timeout, T_s);
     return derived;
 }
-
-HSEP_API size_t hsep_block_bytes(hsep_real bytes) { return bytes < 0.5 * (hsep_real)SIZE_MAX ? (size_t)bytes : 0; }

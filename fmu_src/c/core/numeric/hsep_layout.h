@@ -40,6 +40,9 @@ static inline hsep_int hsep_take_block(hsep_real *end, hsep_real bytes)
     return hsep_take(end, bytes / sizeof(hsep_real));
 }
 
+/* Bytes of a block as an object's size; 0 if it cannot be one. */
+static inline size_t hsep_block_bytes(hsep_real bytes) { return bytes < 0.5 * (hsep_real)SIZE_MAX ? (size_t)bytes : 0; }
+
 /* The array at an offset of a block, */
 static inline hsep_real *hsep_at(void *block, hsep_int offset) { return (hsep_real *)block + offset; }
 static inline const hsep_real *hsep_at_const(const void *block, hsep_int offset)

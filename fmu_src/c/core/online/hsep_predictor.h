@@ -73,6 +73,8 @@ struct hsep_predictor {
 };
 HSEP_ASSERT_WORDS(hsep_predictor, 35);
 
+/* Parameters that follow from those of the library; the modes are not copied. */
+HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *parameters);
 HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. */
 HSEP_API void hsep_predictor_block_init(
