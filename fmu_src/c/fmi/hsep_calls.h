@@ -158,43 +158,31 @@ HSEP_API int hsep_values_integer(double number);
     } \
     return v##OK
 
+/* A function of a version that does an action (HSEP_DO), with these parameters, of which c is the handle. */
+#define HSEP_FUNCTION(v, function, action, ...) \
+    v##Status v##function(__VA_ARGS__) { HSEP_DO(v, function, c, action); }
+
 /* The functions of a version that others have by other names: of a handle's type, v##Handle, of a state's, v##State,
  * whose reading is spelt De (DeSerialize). */
 #define HSEP_COMMON_FUNCTIONS(v, Handle, State, De) \
     void v##FreeInstance(v##Handle c) { hsep_instance_free(c); } \
-    v##Status v##SetDebugLogging(v##Handle c, v##Boolean on, size_t n, const v##String categories[]) \
-    { \
-        HSEP_DO(v, SetDebugLogging, c, hsep_call_logging(self, call, on, n, categories)); \
-    } \
-    v##Status v##ExitInitializationMode(v##Handle c) \
-    { \
-        HSEP_DO(v, ExitInitializationMode, c, hsep_call_initialise(self, call)); \
-    } \
-    v##Status v##Terminate(v##Handle c) { HSEP_DO(v, Terminate, c, hsep_call_phase(self, HSEP_TERMINATED)); } \
-    v##Status v##Reset(v##Handle c) { HSEP_DO(v, Reset, c, (hsep_instance_reset(self), HSEP_OK)); } \
-    v##Status v##Get##State(v##Handle c, v##State *state) \
-    { \
-        HSEP_DO(v, Get##State, c, hsep_call_save(self, call, state)); \
-    } \
-    v##Status v##Set##State(v##Handle c, v##State state) \
-    { \
-        HSEP_DO(v, Set##State, c, hsep_call_restore(self, call, state)); \
-    } \
-    v##Status v##Free##State(v##Handle c, v##State *state) \
-    { \
-        HSEP_DO(v, Free##State, c, hsep_call_free_state(self, call, state)); \
-    } \
-    v##Status v##Serialized##State##Size(v##Handle c, v##State state, size_t *size) \
-    { \
-        HSEP_DO(v, Serialized##State##Size, c, hsep_call_state_size(self, call, state, size)); \
-    } \
-    v##Status v##Serialize##State(v##Handle c, v##State state, v##Byte bytes[], size_t size) \
-    { \
-        HSEP_DO(v, Serialize##State, c, hsep_call_serialise(self, call, state, bytes, size)); \
-    } \
-    v##Status v##De##State(v##Handle c, const v##Byte bytes[], size_t size, v##State *state) \
-    { \
-        HSEP_DO(v, De##State, c, hsep_call_deserialise(self, call, bytes, size, state)); \
-    }
+    HSEP_FUNCTION( \
+        v, SetDebugLogging, hsep_call_logging(self, call, on, n, categories), v##Handle c, v##Boolean on, size_t n, \
+        const v##String categories[]) \
+    HSEP_FUNCTION(v, ExitInitializationMode, hsep_call_initialise(self, call), v##Handle c) \
+    HSEP_FUNCTION(v, Terminate, hsep_call_phase(self, HSEP_TERMINATED), v##Handle c) \
+    HSEP_FUNCTION(v, Reset, (hsep_instance_reset(self), HSEP_OK), v##Handle c) \
+    HSEP_FUNCTION(v, Get##State, hsep_call_save(self, call, state), v##Handle c, v##State *state) \
+    HSEP_FUNCTION(v, Set##State, hsep_call_restore(self, call, state), v##Handle c, v##State state) \
+    HSEP_FUNCTION(v, Free##State, hsep_call_free_state(self, call, state), v##Handle c, v##State *state) \
+    HSEP_FUNCTION( \
+        v, Serialized##State##Size, hsep_call_state_size(self, call, state, size), v##Handle c, v##State state, \
+        size_t *size) \
+    HSEP_FUNCTION( \
+        v, Serialize##State, hsep_call_serialise(self, call, state, bytes, size), v##Handle c, v##State state, \
+        v##Byte bytes[], size_t size) \
+    HSEP_FUNCTION( \
+        v, De##State, hsep_call_deserialise(self, call, bytes, size, state), v##Handle c, const v##Byte bytes[], \
+        size_t size, v##State *state)
 
 #endif
