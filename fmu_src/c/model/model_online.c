@@ -210,8 +210,8 @@ static double online_at(const hsep_context *context, const double values[], size
 }
 
 /* Count a step from t by h, s, and check the inputs that it latches; self is unchanged. may_miss: whether x_meas may be
- * NaN, which is missing. Fails if one of them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant is
- * no communication point; HSEP_WARNED_MOVED: one was taken at a point beside it; or both. */
+ * NaN, which is missing. Fails if one of them cannot be taken in, or t and h do not fit. HSEP_WARNED_LATE: an instant
+ * is no communication point; HSEP_WARNED_MOVED: one was taken at a point beside it; or both. */
 static hsep_status online_count(
     const hsep_context *context, const online_inputs *self, const double values[], int may_miss, double t, double h,
     hsep_clock_step *counted, char message[])
