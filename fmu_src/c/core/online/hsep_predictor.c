@@ -9,24 +9,6 @@ static hsep_int predictor_take(hsep_real *end, hsep_real late, hsep_real count)
 /* Parts in which the averaged model predicts a window behind its first sample, as variances are dear. */
 static const hsep_int predictor_parts = 25;
 
-static hsep_residual_model *predictor_model(hsep_predictor *self) { return hsep_part(self, self->model); }
-
-static hsep_real predictor_lay_out_model(hsep_residual_model *self, const hsep_predictor_parameters *parameters)
-{
-    const hsep_predictor_settings *settings = &parameters->settings;
-    hsep_real end = HSEP_WORDS(hsep_residual_model);
-    self->Np = settings->Np;
-    self->late = hsep_late(settings);
-    self->n = self->Np + self->late;
-    self->planned = parameters->planned != 0;
-    if (parameters->averaging.averaging) {
-        self->averaged = hsep_take_block(&end, hsep_averaged_lay_out(&(hsep_averaged){0}, parameters));
-    } else {
-        self->paper = hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, settings));
-    }
-    return end * sizeof(hsep_real);
-}
-
 HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
 {
     const hsep_real Np = (hsep_real)parameters->settings.Np, preview = (hsep_real)parameters->preview;
@@ -54,7 +36,11 @@ HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predi
     self->e_h = parameters->planned ? hsep_take(&end, n + p) : self->past_e;
     self->physics = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, parameters));
     self->uncertainty = hsep_take_block(&end, hsep_uncertainty_lay_out(&(hsep_uncertainty){0}, self->Np, self->n));
-    self->model = hsep_take_block(&end, predictor_lay_out_model(&(hsep_residual_model){0}, parameters));
+    if (parameters->averaging.averaging) {
+        self->averaged = hsep_take_block(&end, hsep_averaged_lay_out(&(hsep_averaged){0}, parameters));
+    } else {
+        self->paper = hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, &parameters->settings));
+    }
     if (parameters->averaging.averaging && !parameters->planned) { /* the state at the run's beginning is corrected */
         self->motion = hsep_take_block(&end, hsep_start_lay_out(&(hsep_start){0}, parameters));
     }
@@ -75,7 +61,6 @@ HSEP_API void hsep_predictor_block_init(
     hsep_uncertainty_init(
         hsep_predictor_uncertainty(self), self->Np, self->n,
         hsep_uncertainty_first_variance(parameters->settings.lambda, parameters->averaging.noise_std));
-    (void)predictor_lay_out_model(predictor_model(self), parameters);
     if (parameters->averaging.averaging) {
         hsep_averaged_init(hsep_predictor_averaged(self), parameters, start);
     } else {
@@ -99,16 +84,15 @@ static int predictor_settled(hsep_predictor *self)
 static void predictor_learn(hsep_predictor *self, hsep_int i, hsep_real measured, hsep_real command)
 {
     hsep_averaged *averaged = hsep_predictor_averaged(self);
-    const int learning = predictor_model(self)->learning != 0;
     hsep_real *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
     if (averaged != NULL) {
         hsep_recall_append_command(hsep_averaged_recall(averaged), command - self->start);
         hsep_at(averaged, averaged->measured)[self->Np - 1 - i] = measured - self->start;
-        if (learning && predictor_settled(self)) {
+        if (self->learning && predictor_settled(self)) {
             hsep_averaged_follow(
                 averaged, hsep_at(self, self->command) + self->late, past_x + self->late, past_e + self->late, i + 1);
         }
-    } else if (learning) {
+    } else if (self->learning) {
         const hsep_int j = self->n - 1 - i;
         hsep_paper_learn(hsep_predictor_paper(self), past_x + j, past_e + j);
     }
@@ -163,18 +147,17 @@ static void predictor_start(hsep_predictor *self)
 HSEP_API void hsep_predictor_finish(hsep_predictor *self)
 {
     const hsep_int n = self->n, late = self->late;
-    const hsep_residual_model *model = predictor_model(self);
     hsep_averaged *averaged = hsep_predictor_averaged(self);
     hsep_real *past_x = hsep_at(self, self->past_x), *past_e = hsep_at(self, self->past_e);
     if (self->motion && self->k == self->preview + self->Np) {
         predictor_start(self);
     }
-    if (averaged != NULL &&
-        (model->learning || model->planned)) { /* a first fill that was planned is what was before */
+    const int planned = self->e_h != self->past_e; /* a first fill that was planned is what was before */
+    if (averaged != NULL && (self->learning || planned)) {
         hsep_averaged_learn(
-            averaged, hsep_at(self, self->command) + late, past_x + late, past_e + late, model->learning != 0);
+            averaged, hsep_at(self, self->command) + late, past_x + late, past_e + late, self->learning != 0);
     }
-    if (model->learning) {
+    if (self->learning) {
         const hsep_real *accepted = averaged != NULL ? hsep_at(averaged, averaged->accepted) : NULL; /* all */
         hsep_uncertainty_learn(hsep_predictor_uncertainty(self), past_e + late, accepted);
     }
@@ -204,8 +187,8 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     if (e_h != past_e) {
         memcpy(e_h + n, past_e + n, (size_t)self->p * sizeof(hsep_real));
     }
-    predictor_model(self)->learning = self->k >= self->preview; /* the first fill is not learned */
-    if (averaged == NULL) {                                     /* the weights, eq. (6) */
+    self->learning = self->k >= self->preview; /* the first fill is not learned */
+    if (averaged == NULL) {                    /* the weights, eq. (6) */
         hsep_paper *paper = hsep_predictor_paper(self);
         hsep_regression_solve(hsep_paper_regression(paper), hsep_at(paper, paper->weights));
     }
@@ -342,8 +325,7 @@ static hsep_real predictor_rms(const hsep_predictor *self, hsep_real sum)
 HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_outputs *outputs)
 {
     const hsep_int i = self->k % self->Np;
-    const hsep_residual_model *model = hsep_part_const(self, self->model);
-    const hsep_averaged *averaged = hsep_part_const(model, model->averaged);
+    const hsep_averaged *averaged = hsep_part_const(self, self->averaged);
     outputs->x_d = hsep_at_const(self, self->x_d)[i];
     outputs->x_pb = hsep_at_const(self, self->x_pb)[i];
     outputs->x_h = hsep_at_const(self, self->x_h)[i];
@@ -353,7 +335,7 @@ HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_out
     outputs->rms_h = predictor_rms(self, self->sum_h);
     outputs->rms_hold = predictor_rms(self, self->sum_hold);
     outputs->batch = self->k / self->Np;
-    outputs->n_rejected = model->averaged ? averaged->n_rejected : 0;
+    outputs->n_rejected = self->averaged ? averaged->n_rejected : 0;
     outputs->hybrid_active = i >= self->n_physics;
     outputs->divergence = (hsep_divergence)self->divergence;
 }

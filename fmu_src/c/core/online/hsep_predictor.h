@@ -30,16 +30,6 @@
 #include "hsep_start.h"
 #include "hsep_uncertainty.h"
 
-/* Model of the residual e_pb = x - x_pb, the paper's or the averaged one: the block holds one of them. */
-typedef struct {
-    hsep_int Np, late, n; /* samples of a window, late samples before it, both */
-    hsep_int planned;     /* whether a compensator decides the commands */
-    hsep_int learning;    /* whether the window is learned */
-    /* Offsets in words from the beginning of the struct; one of them is 0 */
-    hsep_int paper, averaged;
-} hsep_residual_model;
-HSEP_ASSERT_WORDS(hsep_residual_model, 7);
-
 struct hsep_predictor {
     hsep_int Np, late, n, preview; /* n = Np + late */
     hsep_int p, q;                 /* lags of e_pb and of x_pb */
@@ -48,6 +38,7 @@ struct hsep_predictor {
     hsep_int k;                     /* index of the next sample */
     hsep_int n_published;           /* samples of the window that are predicted */
     hsep_int n_physics;             /* leading samples of the window where x_h = x_pb */
+    hsep_int learning;              /* whether the window is learned */
     hsep_int n_measured;            /* samples since t_init */
     hsep_real sum_e, sum_pb, sum_h; /* m2, sums of squared servo and prediction errors over them */
     hsep_real sum_hold;             /* m2, the same if the last residual measured before each window were held */
@@ -68,10 +59,10 @@ struct hsep_predictor {
     hsep_int past_e;   /* (n + p,) m, e_pb likewise, as measured */
     hsep_int e_h;      /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
     hsep_int physics, uncertainty;
-    hsep_int model;  /* the residual model */
-    hsep_int motion; /* the motion before the run; with averaging, alone */
+    hsep_int paper, averaged; /* the model of the residual e_pb = x - x_pb; the other one is 0 */
+    hsep_int motion;          /* the motion before the run; with averaging, alone */
 };
-HSEP_ASSERT_WORDS(hsep_predictor, 35);
+HSEP_ASSERT_WORDS(hsep_predictor, 37);
 
 /* Parameters that follow from those of the library; the modes are not copied. */
 HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *parameters);
@@ -85,13 +76,11 @@ HSEP_API void hsep_predictor_block_init(
 static inline hsep_physics *hsep_predictor_physics(hsep_predictor *self) { return hsep_part(self, self->physics); }
 static inline hsep_paper *hsep_predictor_paper(hsep_predictor *self)
 {
-    hsep_residual_model *model = hsep_part(self, self->model);
-    return model->paper ? hsep_part(model, model->paper) : NULL;
+    return self->paper ? hsep_part(self, self->paper) : NULL;
 }
 static inline hsep_averaged *hsep_predictor_averaged(hsep_predictor *self)
 {
-    hsep_residual_model *model = hsep_part(self, self->model);
-    return model->averaged ? hsep_part(model, model->averaged) : NULL;
+    return self->averaged ? hsep_part(self, self->averaged) : NULL;
 }
 static inline hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self)
 {
