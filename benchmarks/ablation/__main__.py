@@ -94,7 +94,7 @@ VARIANTS: Mapping[str, Changes] = {
     "earlier runs forgotten whatever they err by": constants(discard_error=0.0),
     "A's bound does not grow": {FORECAST: [("growth = before > 0.0 ?", "growth = before < 0.0 ?")]},
     "hold goes on where the command turns": {
-        FORECAST: [("(1.0 - hsep_disturbances_turned(disturbances, row))", "((void)row, 1.0)")]
+        FORECAST: [("turned = hsep_disturbances_turned(disturbances, row);", "turned = ((void)row, 0.0);")]
     },
     "features never begin anew": constants(velocity_jump=1e300),
     "rows are independent": constants(correlation_max=1.0),

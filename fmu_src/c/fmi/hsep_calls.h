@@ -94,6 +94,7 @@ hsep_call_deserialise(hsep_instance *instance, const hsep_call *call, const void
 typedef struct {
     const char *call;
     const char *type; /* as the version's functions are called */
+    int sets;         /* whether they have to be such as may be set now */
     const unsigned *references;
     size_t n_references;
     const void *values;

@@ -34,36 +34,24 @@ HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep
                 instance, "%s: %s (value reference %u) is of type %s, not %s", access->call,
                 names->name(context, reference, name), reference, type, access->type);
         }
+        const hsep_causality causality = found.row->causality;
+        if (access->sets && causality != HSEP_INPUT && causality != HSEP_PARAMETER) {
+            return hsep_refuse(
+                instance, "%s: %s is %s and cannot be set", access->call, names->name(context, reference, name),
+                values_causalities[causality]);
+        }
+        if (access->sets && causality == HSEP_PARAMETER && !found.row->tunable &&
+            instance->experiment.phase == HSEP_STEPPING) {
+            return hsep_refuse(
+                instance, "%s: %s is a fixed parameter and cannot be set after the initialization; call %s first",
+                access->call, names->name(context, reference, name), names->reset);
+        }
         n_values += found.count;
     }
     if (n_values != access->n_values) {
         return hsep_refuse(
             instance, "%s: %s must be %lu, the number of values of all variables, got %lu", access->call,
             names->n_values, (unsigned long)n_values, (unsigned long)access->n_values);
-    }
-    return HSEP_OK;
-}
-
-/* Check beside it that they may be set now. */
-static hsep_status values_check_set(const hsep_instance *instance, const hsep_access *access)
-{
-    const hsep_context *context = &instance->context;
-    const hsep_fmi_names *names = instance->names;
-    char name[HSEP_NAME_SIZE];
-    for (size_t i = 0; i < access->n_references; i++) {
-        const unsigned reference = access->references[i];
-        const hsep_variable *variable = names->find(context, reference).row;
-        if (variable->causality != HSEP_INPUT && variable->causality != HSEP_PARAMETER) {
-            return hsep_refuse(
-                instance, "%s: %s is %s and cannot be set", access->call, names->name(context, reference, name),
-                values_causalities[variable->causality]);
-        }
-        if (variable->causality == HSEP_PARAMETER && !variable->tunable &&
-            instance->experiment.phase == HSEP_STEPPING) {
-            return hsep_refuse(
-                instance, "%s: %s is a fixed parameter and cannot be set after the initialization; call %s first",
-                access->call, names->name(context, reference, name), names->reset);
-        }
     }
     return HSEP_OK;
 }
@@ -106,11 +94,11 @@ HSEP_API hsep_status hsep_call_access(
     size_t n_values)
 {
     const char *verb = call->name + strlen("fmi2");
-    const hsep_access access = {call->name, verb + strlen("Get"), references, n, values, n_values};
+    const hsep_access access = {call->name, verb + strlen("Get"), verb[0] == 'S', references, n, values, n_values};
     if (hsep_values_check(instance, &access) != HSEP_OK) {
         return HSEP_REFUSED;
     }
-    return verb[0] == 'S' ? values_check_set(instance, &access) : values_prepare(instance, &access);
+    return access.sets ? HSEP_OK : values_prepare(instance, &access);
 }
 
 HSEP_API hsep_status

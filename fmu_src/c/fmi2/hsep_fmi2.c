@@ -196,7 +196,7 @@ static hsep_status fmi2_set_derivatives(
 fmi2Status fmi2SetRealInputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], const fmi2Real value[])
 {
-    const hsep_access access = {HSEP_CALL(fmi2, SetRealInputDerivatives)->name, "Real", vr, nvr, value, nvr};
+    const hsep_access access = {HSEP_CALL(fmi2, SetRealInputDerivatives)->name, "Real", 0, vr, nvr, value, nvr};
     HSEP_DO(fmi2, SetRealInputDerivatives, c, fmi2_set_derivatives(self, &access, order, value));
 }
 
