@@ -23,7 +23,7 @@ from hybridsep.base.errors import SignalError
 from hybridsep.predict.averaging.constants import CONSTANTS
 
 AVERAGING = "predict/averaging/"
-START = AVERAGING + "hsep_start.c"
+START = AVERAGING + "hsep_start.h"
 STATE, FORECAST = (AVERAGING + f"hsep_averaged_{part}.c" for part in ("model", "forecast"))
 
 
@@ -58,7 +58,7 @@ def together(*changes: Changes) -> Changes:
 def without_component(i: int) -> Changes:
     """Return intervals without one of their components."""
     last = "        f[2] = variance != NULL && k >= n_physics ? variance[j] : 0.0;"
-    return {"predict/hsep_uncertainty.c": [(last, f"{last}\n        f[{i}] = 0.0;")]}
+    return {"predict/hsep_uncertainty.h": [(last, f"{last}\n        f[{i}] = 0.0;")]}
 
 
 NO_DOUBTING: Changes = {
@@ -99,7 +99,7 @@ VARIANTS: Mapping[str, Changes] = {
     "features never begin anew": constants(velocity_jump=1e300),
     "rows are independent": constants(correlation_max=1.0),
     "no recall": {
-        AVERAGING + "hsep_recall.c": [
+        AVERAGING + "hsep_recall.h": [
             ("    if (self->size <= self->n) {", "    if (self->size <= self->n + self->size) {")
         ]
     },

@@ -9,6 +9,7 @@
 
 #include "hsep_layout.h"
 #include "hsep_window.h"
+#include "hsep_predict_constants.h"
 
 typedef struct {
     hsep_int size;       /* samples; 0: none */
@@ -32,16 +33,108 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_recall, 16);
 
 /* It is all that a block of 0 needs to be at rest. */
-HSEP_API hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predictor_parameters *parameters);
+static inline hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predictor_parameters *parameters)
+{
+    const hsep_real size = (hsep_real)parameters->averaging.recall;
+    hsep_real end = HSEP_WORDS(hsep_recall);
+    self->size = parameters->averaging.recall;
+    self->Np = parameters->settings.Np;
+    self->n = self->lag = hsep_predicted(parameters);
+    self->stride = self->Np > HSEP_RECALL_UPDATES ? self->Np / HSEP_RECALL_UPDATES : 1;
+    self->fading = hsep_exp(-(hsep_real)self->stride / (hsep_real)self->Np);
+    self->commands = hsep_take(&end, (hsep_real)self->stride);
+    self->changes = hsep_take(&end, size + (hsep_real)self->stride);
+    self->residuals = hsep_take(&end, size);
+    self->distances = hsep_take(&end, size);
+    return end * sizeof(hsep_real);
+}
+
+/* distance := fading distance + difference^2 of a change now from count changes before it. */
+static inline void recall_add(
+    hsep_real *restrict distances, const hsep_real *restrict changes, hsep_int count, hsep_real now, hsep_real fading)
+{
+    for (hsep_int i = 0; i < count; i++) {
+        const hsep_real difference = now - changes[i];
+        distances[i] = fading * distances[i] + (difference * difference + HSEP_RECALL_ALIKE);
+    }
+}
+
+/* Compare the latched change with those first ... last - 1 samples before it; in the last comparison of a window, which
+ * its forecast has, look for the lag with the least distance. */
+static inline void recall_compare(hsep_recall *self, hsep_int first, hsep_int last, int is_last)
+{
+    const hsep_int length = self->size + self->stride;
+    const hsep_real *changes = hsep_at(self, self->changes), now = changes[self->compared];
+    hsep_real *distances = hsep_at(self, self->distances);
+    hsep_int lag = self->lag;
+    for (hsep_int begin = first; begin < last;) { /* up to the end of the ring, and from its beginning on */
+        const hsep_int place = (self->compared + begin) % length, left = length - place;
+        const hsep_int count = last - begin < left ? last - begin : left;
+        recall_add(distances + (begin - 1), changes + place, count, now, self->fading);
+        begin += count;
+    }
+    const hsep_int begin = first > self->n ? first - 1 : self->n, end = (last < self->size ? last : self->size) - 1;
+    if (is_last && begin < end) { /* the shortest lag of equals */
+        const hsep_int found = begin + hsep_place_of_least(distances + begin, end - begin);
+        lag = distances[found] < distances[lag - 1] ? found + 1 : lag;
+    }
+    self->lag = lag;
+}
 
 /* Take in the command that comes next, m, relative to the start. Cost: size / stride multiply-adds. */
-HSEP_API void hsep_recall_append_command(hsep_recall *self, hsep_real command);
+static inline void hsep_recall_append_command(hsep_recall *self, hsep_real command)
+{
+    const hsep_int part = self->heard % self->stride, size = self->size;
+    hsep_real *before = hsep_at(self, self->commands) + self->oldest;
+    if (size == 0) {
+        return;
+    }
+    self->newest = (self->newest > 0 ? self->newest : size + self->stride) - 1;
+    hsep_at(self, self->changes)[self->newest] = command - *before;
+    *before = command;
+    self->oldest = self->oldest + 1 < self->stride ? self->oldest + 1 : 0;
+    const hsep_int compared = self->Np / self->stride * self->stride;
+    if (self->heard < compared) {
+        if (part == 0) {
+            const hsep_real change = hsep_at(self, self->changes)[self->newest];
+            self->compared = self->newest;
+            self->lag = self->n;
+            self->moved = self->fading * self->moved + (change * change + HSEP_RECALL_ALIKE);
+        }
+        recall_compare(
+            self, 1 + part * size / self->stride, 1 + (part + 1) * size / self->stride,
+            self->heard + self->stride >= compared);
+    }
+    self->heard = self->heard + 1 < self->Np ? self->heard + 1 : 0;
+}
 
 /* Take in the residuals of the window, (Np,), m, newest first. */
-HSEP_API void hsep_recall_remember(hsep_recall *self, const hsep_real e[]);
+static inline void hsep_recall_remember(hsep_recall *self, const hsep_real e[])
+{
+    for (hsep_int j = self->size > 0 ? self->Np : 0; j-- > 0;) {
+        self->remembered = (self->remembered > 0 ? self->remembered : self->size) - 1;
+        hsep_at(self, self->residuals)[self->remembered] = e[j];
+    }
+}
 
 /* Residuals after the commands most like those ahead, (n,), m, newest first, moved to the last one, which fades. Return
  * how much they count, 0 ... 1; 0 if the memory is shorter. */
-HSEP_API hsep_real hsep_recall_forecast(const hsep_recall *self, hsep_real last, hsep_real recalled[]);
+static inline hsep_real hsep_recall_forecast(const hsep_recall *self, hsep_real last, hsep_real recalled[])
+{
+    const hsep_real *residuals = hsep_at_const(self, self->residuals);
+    const hsep_real tolerated = HSEP_AVERAGING_RECALL_TOLERANCE * HSEP_AVERAGING_RECALL_TOLERANCE * self->moved;
+    const hsep_int n = self->n, lag = self->lag;
+    memset(recalled, 0, (size_t)n * sizeof(hsep_real));
+    if (self->size <= self->n) {
+        return 0.0;
+    }
+    for (hsep_int k = 0; k < n; k++) {
+        const hsep_real before = residuals[(self->remembered + lag) % self->size];
+        const hsep_real fade = hsep_exp(-(hsep_real)(k + 1) / (HSEP_AVERAGING_RECALL_FADE * (hsep_real)self->Np));
+        recalled[n - 1 - k] = residuals[(self->remembered + lag - 1 - k) % self->size] + (last - before) * fade;
+    }
+    const hsep_real distance = hsep_at_const(self, self->distances)[lag - 1];
+    return distance > 0.0 ? tolerated / (tolerated + distance) : 0.0;
+}
 
 #endif
