@@ -5,6 +5,7 @@ import os
 import shlex
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from rich.table import Table
 
 from ..base.errors import ParameterError, brief
 from ..base.files import plain
-from ..base.metrics import in_unit, rms_ratio, shown_figure
+from ..base.metrics import rms_ratio, shown_figure
 
 if TYPE_CHECKING:
     from ..cosim.run import Run
@@ -70,18 +71,17 @@ def print_run(
     from ..cosim.run import PREDICTOR
     from ..evaluate.verdict import verdict_of
 
-    summary = run.summary()
+    summary = replace(run, unit=unit).summary()
     if as_json:
-        named = in_unit(summary, unit)
-        print_json({**named, **({"verdict": str(verdict_of(run))} if run.kind == PREDICTOR else limits or {})})
+        print_json({**summary, **({"verdict": str(verdict_of(run))} if run.kind == PREDICTOR else limits or {})})
         return
     if run.kind != PREDICTOR:
         _print_tracking(summary, title, unit, shown, limits)
         return
-    scale, name = shown.error(1e-6 * summary["rms_pb_um"])
+    scale, name = shown.error(1e-6 * summary[f"rms_pb_u{unit}"])
     rows = []
     for label, size in (("RMS", "rms"), ("largest", "max")):
-        figures = [1e-6 * scale * summary[f"{size}_{by}_um"] for by in ("pb", "hold", "h")]
+        figures = [1e-6 * scale * summary[f"{size}_{by}_u{unit}"] for by in ("pb", "hold", "h")]
         rows.append([label, *map(shown_figure, (*figures, rms_ratio(figures[2], figures[1])))])
     title = f"{title}: prediction error in {name} against the measured position"
     print_rows(title, ["", "physics", "hold", "hybrid", "× hold"], rows)
@@ -94,9 +94,9 @@ def _print_tracking(
     from ..fitting.compensation import binding_words
 
     factor, position = shown.position
-    scale, small = shown.error(1e-6 * summary["tracking_rms_um"])
+    scale, small = shown.error(1e-6 * summary[f"tracking_rms_u{unit}"])
     rows = [
-        [label, *(shown_figure(1e-6 * scale * summary[f"{name}_{quantity}_um"]) for quantity in ("rms", "max"))]
+        [label, *(shown_figure(1e-6 * scale * summary[f"{name}_{quantity}_u{unit}"]) for quantity in ("rms", "max"))]
         for name, label in (
             ("tracking", "tracking error, true position"),
             ("tracking_measured", "tracking error, measured position"),
@@ -104,7 +104,7 @@ def _print_tracking(
         )
     ]
     print_rows(title, ["", f"RMS [{small}]", f"max [{small}]"], rows)
-    peaks = [summary[f"peak_{name}"] for name in ("velocity_m_s", "acceleration_m_s2", "jerk_m_s3")]
+    peaks = [summary[f"peak_{name}"] for name in (f"velocity_{unit}_s", f"acceleration_{unit}_s2", f"jerk_{unit}_s3")]
     console.print(
         f"command to the drive: at most {factor * peaks[0]:.4g} {position}/s, {factor * peaks[1]:.4g} {position}/s², "
         f"{factor * peaks[2]:.4g} {position}/s³\n"

@@ -124,9 +124,10 @@ def read_checked(path: Path, reading: options.ReadingOptions, machine: Machine) 
     """
     import numpy as np
 
+    from ..base.signals import check_interval
     from ..logs.checks import checked
     from ..logs.log import read_log, whole_turns
-    from ..machines.machine import check_interval, check_unit
+    from ..machines.machine import check_unit
 
     log = read_log(path, **reading.arguments(machine))
     check_unit(path.name, log, machine)
@@ -134,7 +135,7 @@ def read_checked(path: Path, reading: options.ReadingOptions, machine: Machine) 
     if log.unit == "rad":  # where the file states none
         log, said = whole_turns(log)
         log = replace(log, remarks=(*log.remarks, *([said] if said else [])))
-    check_interval(path.name, log.T_s, machine)
+    check_interval(path.name, log.T_s, f"machine {machine.name}", machine.T_s)
     if not machine.predictor_settings.averaging and np.isnan(log.x_meas).any():
         first = int(np.argmax(np.isnan(log.x_meas)))
         raise LogError(

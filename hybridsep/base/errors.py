@@ -5,6 +5,7 @@ Each message names the thing, what was expected, what came and, where there is o
 
 from collections.abc import Callable, Collection
 from itertools import islice
+from typing import Any
 
 _LINE_MAX = 200  # largest length of another library's message within one of ours, in characters
 _LISTED_MAX = 12  # most names or problems that a message lists; more are counted
@@ -37,6 +38,24 @@ class HybridSepError(Exception):
 
 class ParameterError(HybridSepError, ValueError):
     """A parameter is out of its range, or several are inconsistent."""
+
+
+def check_kind(kind: Any, **given: object) -> None:
+    """Raise ParameterError if what is given, by its name, is not of a type, or of one of a union of types.
+
+    A text, bytes or a truth value is only what is called so: no sequence, and no number.
+    """
+    kinds = getattr(kind, "__args__", (kind,))
+    for name, value in given.items():
+        if not isinstance(value, kind) or (type(value) in {str, bytes, bool} - {*kinds}):
+            wanted = " or ".join(one.__name__ for one in kinds).replace("NoneType", "None")
+            raise ParameterError(f"{name} must be of type {wanted}, got {brief(value)}")
+
+
+def check_has(what: str, value: object, *names: str) -> None:
+    """Raise ParameterError if an object of the user's own lacks one of the attributes that are needed of it."""
+    if lacking := [name for name in names if not hasattr(value, name)]:
+        raise ParameterError(f"{what} must have {', '.join(names)}, got {brief(value)} without {', '.join(lacking)}")
 
 
 class SignalError(HybridSepError, ValueError):

@@ -16,6 +16,8 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import IO, Any
 
+from .errors import check_kind
+
 DEFAULT_MACHINE = "spring_mass_damper"  # machine file of the paper's staircase; its FMUs have no suffix
 COMMANDS = "commands.csv"  # file that ``hybridsep fit`` writes beside a machine file: commands of the log to try with
 
@@ -28,6 +30,12 @@ def data_folder(name: str) -> Path:
     return installed if installed.is_dir() else _PACKAGE.parent / name
 
 
+def as_path(path: str | os.PathLike[str], name: str = "path") -> Path:
+    """Return a path; ParameterError, with its name, if it is none."""
+    check_kind(str | os.PathLike, **{name: path})
+    return Path(path)
+
+
 @contextmanager
 def atomic_open(path: str | Path) -> Iterator[IO[bytes]]:
     """Open a binary file that replaces ``path`` when the block ends without an exception; its folder is made.
@@ -38,7 +46,7 @@ def atomic_open(path: str | Path) -> Iterator[IO[bytes]]:
     OSError with ``path`` as its file name, if it is a folder or write-protected or cannot be written; an old file is
     unchanged.
     """
-    target = Path(os.path.realpath(path))
+    target = Path(os.path.realpath(as_path(path)))
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".hybridsep-{uuid.uuid4().hex}.tmp")
     try:

@@ -51,14 +51,14 @@ class Parameter:
         """
         shown = label or self.name
         if self.kind is str:
-            if value not in self.choices:
+            if not isinstance(value, str) or value not in self.choices:
                 raise ParameterError(f"{shown} must be one of {', '.join(self.choices)}, got {brief(value)}")
             return value
         if self.kind is bool:
             if not isinstance(value, (bool, int, float)) or value not in (0, 1):
                 raise ParameterError(f"{shown} must be true or false, got {brief(value)}")
             return bool(value)
-        number = self._number(value, shown)
+        number = finite(value, shown)
         if self.kind is int and number != int(number):
             raise ParameterError(f"{shown} must be a whole number, got {brief(value)}")
         in_range = self.minimum <= number <= self.maximum and not 0 < abs(number) < self.nonzero
@@ -75,22 +75,25 @@ class Parameter:
         """Return the parameter's value from an FMU variable's value; ParameterError if there is none."""
         if not self.choices:
             return value
-        number = self._number(value, self.name)
+        number = finite(value, self.name)
         if number not in range(len(self.choices)):
             raise ParameterError(f"{self.name} must be 0 … {len(self.choices) - 1}, got {brief(value)}")
         return self.choices[int(number)]
 
-    @staticmethod
-    def _number(value: Any, shown: str) -> float:
-        try:
-            if isinstance(value, (bool, str, bytes)):
-                raise TypeError
-            number = float(value)
-        except (TypeError, ValueError, OverflowError):
-            raise ParameterError(f"{shown} must be a number, got {brief(value)}") from None
-        if not math.isfinite(number):
-            raise ParameterError(f"{shown} must be finite, got {brief(value)}")
-        return number
+
+def finite(value: Any, shown: str, *, above: float = -math.inf, least: float = -math.inf) -> float:
+    """Return a number, finite, ``> above`` and ``≥ least``; ParameterError, with the name ``shown``, if it is none."""
+    try:
+        if isinstance(value, (bool, str, bytes)):
+            raise TypeError
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{shown} must be a number, got {brief(value)}") from None
+    if not math.isfinite(number):
+        raise ParameterError(f"{shown} must be finite, got {brief(value)}")
+    if not (number > above and number >= least):
+        raise ParameterError(f"{shown} must be {f'≥ {least:g}' if number > above else f'> {above:g}'}, got {number:g}")
+    return number
 
 
 _ANGULAR = {"m": "rad", "m2": "rad2", "m/s": "rad/s", "m/s2": "rad/s2", "m/s3": "rad/s3", "1/m": "1/rad"}

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import SignalError, brief, first_line
+from .errors import ParameterError, SignalError, brief, first_line
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+_Factor = Callable[[str], float] | None
 
 _POSITION_MAX: Mapping[str, float] = {"m": 1e3, "rad": 1e6}
 """Largest magnitude of a position: beyond any axis, though a rotary one may turn on and on; a larger value is an error
@@ -99,8 +100,20 @@ def index_values(index: Any) -> NDArray[Any]:
     return np.empty(0)
 
 
-def _as_array(values: Any, name: str, factor: Callable[[str], float] | None = None) -> Array:
-    """Return numbers, NaN where they are missing; SignalError if they are none, in another unit, or have a gap."""
+def check_interval(name: str, T_s: float, other: str, expected: float) -> None:
+    """Raise ParameterError if a sampling interval, s, is not the one that something else has."""
+    if abs(T_s - expected) > 0.01 * expected:
+        raise ParameterError(
+            f"{name} is sampled every {T_s:g} s, but {other} has T_s = {expected:g} s; resample it, say its unit of "
+            "time in the column's name, or correct T_s"
+        )
+
+
+def as_array(values: Any, name: str, factor: _Factor = None, *, T_s: float | None = None) -> Array:
+    """Return numbers, NaN where they are missing; SignalError if they are none, in another unit, or have a gap.
+
+    An index of times, if they have one, must be ``T_s``, s, apart.
+    """
     if factor is None and type(values) is np.ndarray and values.dtype == np.float64 and values.flags.c_contiguous:
         return values
     if hasattr(values, "columns") or isinstance(values, Mapping):
@@ -115,52 +128,67 @@ def _as_array(values: Any, name: str, factor: Callable[[str], float] | None = No
         raise SignalError(f"{name} must be in m or rad, got {brief(given.unit)}; convert it, or read_log does")
     labels = index_values(given.index)
     if len(labels) > 1:
-        steps = np.diff(labels) / np.abs(np.median(np.diff(labels)))
+        usual = np.abs(np.median(np.diff(labels)))
+        steps = np.diff(labels) / usual
         if not (even := (steps > 0.0) & (steps < _GAP)).all():
             i = int(np.argmin(even))
             raise SignalError(
                 f"the index of {name} must be even, it goes from {labels[i]} to {labels[i + 1]} at sample {i + 1}; "
                 "read_log puts a few rows back, and begins another segment after a longer gap"
             )
+        if T_s is not None and labels.dtype.kind in "mM":
+            check_interval(f"the index of {name}", float(usual / np.timedelta64(1, "s")), "what takes it", T_s)
     return np.asarray((factor(given.unit) if factor else 1.0) * given.values, dtype=np.float64, order="C")
 
 
 def as_samples(
-    values: Any, name: str, length: int | None = None, *, factor: Callable[[str], float] | None = None
+    values: Any, name: str, length: int | None = None, *, factor: _Factor = None, T_s: float | None = None
 ) -> Array:
     """Return ``(n,)`` samples as a contiguous float64 vector of ``length``, validated; ``name`` is for messages.
 
     They are in m or rad, or times the ``factor`` of the unit that they state, empty without.
 
-    SignalError if they are not one-dimensional, of the wrong length, not all finite, or no positions in metres or
-    radians.
+    SignalError if there are none, or they are not one-dimensional, of the wrong length, not all finite, no positions in
+    metres or radians; ParameterError if they have an index of times that are not ``T_s``, s, apart.
     """
-    samples = _as_array(values, name, factor)
+    samples = as_array(values, name, factor, T_s=T_s)
     if samples.ndim != 1:
         raise SignalError(f"{name} must be one-dimensional, got shape {samples.shape}")
+    if not len(samples) and length is None:
+        raise SignalError(f"{name} must have at least one sample, got none")
     if length is not None and len(samples) != length:
         raise SignalError(f"{name} must have {length} samples, got {len(samples)}")
     if not np.isfinite(samples).all():
         i = int(np.flatnonzero(~np.isfinite(samples))[0])
         raise SignalError(f"{name} must be finite, got {samples[i]} at sample {i}")
     most = max(_POSITION_MAX.values())
-    if len(samples) and np.abs(samples).max() > most:
+    if np.abs(samples).max(initial=0.0) > most:
         i = int(np.argmax(np.abs(samples)))
         raise SignalError(f"{name} must be within ±{most:g} m or rad, got {samples[i]:g} at sample {i}")
     return samples
 
 
-def as_measured(values: Any, name: str, length: int | None = None) -> Array:
+def as_measured(values: Any, name: str, length: int | None = None, *, T_s: float | None = None) -> Array:
     """Return measured positions as :func:`as_samples` does, NaN where they are missing."""
-    samples = _as_array(values, name)
+    samples = as_array(values, name, T_s=T_s)
     missing = np.isnan(samples)
     return np.where(missing, np.nan, as_samples(np.where(missing, 0.0, samples), name, length))
 
 
-def check_position(name: str, value: float, when: str = "", unit: str = "m") -> None:
-    """Raise SignalError if a position is not finite or beyond :data:`_POSITION_MAX`; ``when`` ends the message."""
+def check_position(name: str, value: float, when: str = "", unit: str = "m", *, may_miss: bool = False) -> None:
+    """Raise SignalError if a position is not finite or beyond :data:`_POSITION_MAX`; ``when`` ends the message.
+
+    NaN, which is missing, passes where it ``may_miss``.
+    """
+    try:
+        if math.isnan(value) and may_miss:
+            return
+    except TypeError:
+        raise SignalError(f"{name} must be a number, got {brief(value)}{when}") from None
     if not math.isfinite(value):
         raise SignalError(f"{name} must be finite, got {value}{when}")
+    if unit not in _POSITION_MAX:
+        raise SignalError(f"unit must be one of {', '.join(_POSITION_MAX)}, got {brief(unit)}")
     if abs(value) > _POSITION_MAX[unit]:
         raise SignalError(f"{name} must be within ±{_POSITION_MAX[unit]:g} {unit}, got {value:g}{when}")
 

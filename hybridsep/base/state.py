@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .errors import SignalError, StateError
+from .errors import SignalError, StateError, check_kind
 from .signals import Array
 
 _MAGIC = b"HSEP"
@@ -47,6 +47,7 @@ def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], di
 
     StateError if the blob is not one, is truncated or damaged, or is of another kind or version.
     """
+    check_kind(bytes, blob=blob)
     if len(blob) < _PREFIX.size + _CRC.size or blob[:4] != _MAGIC:
         raise StateError(f"a saved state of kind {kind!r} was expected, got {len(blob)} bytes of another format")
     _, version, length = _PREFIX.unpack_from(blob)

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import ParameterError, SignalError
+from ..base.errors import ParameterError, SignalError, check_kind
 from ..base.settings import CompensatorSettings, samples_before
 from ..base.signals import as_measured, as_published, as_samples
 from ..base.state import arrays_of, pack, restored, restoring, unpack
@@ -64,6 +64,8 @@ class SepCompensator:
     _SAVED_OF_PLANNING = ("paused", "pause", "ahead", "share", "corrected", "reach")
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
+        check_kind(HybridPredictor, predictor=predictor)
+        check_kind(CompensatorSettings | None, settings=settings)
         Np = predictor.Np
         predictor.settings.check_planning()
         self.predictor = predictor
@@ -154,7 +156,7 @@ class SepCompensator:
         online = self._online
         if online is None:
             start = self.predictor.start
-            online = LookAhead(self, float(x_d_ahead if start is None else start))
+            online = LookAhead(self, x_d_ahead if start is None else start)
             self._online = online  # making it restarts the compensator
         online.sample(x_d_ahead, x_meas, x_load)
         return online.x_dm
@@ -170,7 +172,7 @@ class SepCompensator:
         model, gravity or a table. The drive's model gets it beside the command, so plans make up for it; none if left
         out. SignalError if ``x_d`` or ``load`` has another length or is not finite, or the prediction diverges.
         """
-        command = as_samples(x_d, "x_d", self.preview)
+        command = as_samples(x_d, "x_d", self.preview, T_s=self.T_s)
         loads = np.zeros(self.preview) if load is None else as_samples(load, "load", self.preview)
         predictor, Np = self.predictor, self.predictor.Np
         if predictor.start is None:  # at rest where the first command is
@@ -218,7 +220,7 @@ class SepCompensator:
         if pending is None:
             raise SignalError("update must follow plan: there is no planned window to measure")
         predictor, Np = self.predictor, self.predictor.Np
-        measured, monitor = as_measured(x, "x", Np).copy(), replace(self.monitor)
+        measured, monitor = as_measured(x, "x", Np, T_s=self.T_s).copy(), replace(self.monitor)
         x_d = np.concatenate((self._x_d_before, pending.x_d))
         first = len(self._x_d_before) - predictor.settings.n_late  # what is measured is late
         for i, error in enumerate((measured - x_d[first : first + Np]).tolist()[monitor.n_taken :], monitor.n_taken):

@@ -9,7 +9,7 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
-from ctypes import c_bool, c_double, c_int, c_int32, c_int64, c_uint32, c_uint64
+from ctypes import ArgumentError, c_bool, c_double, c_int, c_int32, c_int64, c_uint32, c_uint64
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from math import prod
@@ -28,8 +28,8 @@ from fmpy.fmi2 import (
 )
 from fmpy.fmi3 import FMU3Slave
 
-from ..base.errors import FmuError, first_line, listed
-from ..base.files import named_errors
+from ..base.errors import FmuError, check_kind, first_line, listed
+from ..base.files import as_path, named_errors
 
 _WORDS_MAX = 1000  # most characters of an FMU's message in an error
 _NO_RUN_NEEDS = ("sources/", "documentation/")  # folders of an archive with most of its files
@@ -78,7 +78,7 @@ def read_description(path: str | Path) -> Any:
 
     FmuError if there is none at ``path``, or fmpy's validation has a finding.
     """
-    path = Path(path)
+    path = as_path(path)
     if not path.is_file():
         raise FmuError(f"no FMU at {path}; build it first (hybridsep build)")
     status = path.stat()
@@ -131,7 +131,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     """
 
     def __init__(self, path: str | Path, instance_name: str | None = None) -> None:
-        self.path = Path(path)
+        self.path = as_path(path)
         self.log: list[tuple[int, str]] = []
         with _working_directory() as folder:
             archive = folder / self.path
@@ -200,6 +200,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         self, values: Mapping[str, Any] | None = None, *, start_time: float = 0.0, stop_time: float | None = None
     ) -> None:
         """Set structural parameters, enter Initialization Mode, set the others; errors as :meth:`initialise`."""
+        check_kind(Mapping | None, values=values)
         slave, experiment = self.slave, {"startTime": start_time, "stopTime": stop_time}
         given = dict(values or {})
         structural = [name for name in given if self._variable(name).causality == "structuralParameter"]
@@ -284,6 +285,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
 
     def restore(self, blob: bytes) -> None:
         """Take over a state that :meth:`save` returned, of this or another instance."""
+        check_kind(bytes, blob=blob)
         state = self._call_state(self._version.deserialise, blob)
         try:
             self._call_state("set", state)
@@ -292,6 +294,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
 
     def _variable(self, name: str) -> Any:
         """Return a variable; FmuError if there is none, or one of a type that is not supported."""
+        check_kind(str, name=name)
         if name not in self.variables:
             raise FmuError(f"{self.path.name} has no variable {name!r}")
         variable = self.variables[name]
@@ -321,7 +324,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
         _ = self.slave  # raises if closed
         try:
             return function(*arguments, **keywords)
-        except (FMICallException, OSError) as error:  # on Windows ctypes raises OSError where others have a signal
+        except (FMICallException, ArgumentError, OSError) as error:  # OSError of Windows, not a signal
             raise FmuError(f"{self.path.name}: {error}{self._last_words()}") from error
 
     def _last_words(self) -> str:

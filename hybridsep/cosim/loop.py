@@ -18,9 +18,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import FmuError, ParameterError
+from ..base.errors import FmuError, ParameterError, check_has, check_kind
 from ..base.settings import check
-from ..base.signals import as_samples, check_position
+from ..base.signals import as_samples, check_interval, check_position
 from ..base.threads import one_blas_thread
 from ..compensate.compensator import SepCompensator
 from ..logs.log import Log
@@ -79,7 +79,7 @@ def cosimulate(
     plant : str, Path or Plant
         An FMU's archive, an object of the library, or one of your own; it is reset to rest at ``r(0)``.
     r : (n,) array_like, m, or Log
-        Commanded positions at ``k·T_s``, or a log that has them.
+        Commanded positions at ``k·T_s``, or a log that has them; of arrays in another unit ``read_log`` makes one.
     controller_values, plant_values : mapping, optional
         Parameters of an FMU to set before the initialization, for example ``{"compensate": 1}`` and ``{"seed": 3}``.
     encoder : Encoder, optional
@@ -94,13 +94,14 @@ def cosimulate(
     FmuError
         If an FMU refuses to load, to initialise or to step, or does not fit; its message is part of the error.
     ParameterError
-        If an argument is for an FMU where there is an object, or the other way round.
+        If an argument is for an FMU where there is an object, or the other way round, or ``r`` is sampled otherwise.
     SignalError
         If ``r`` is empty or not finite.
     """
+    check_kind(Callable | None, sensor=sensor, disturb=disturb, progress=progress)
+    check_kind(Mapping | None, controller_values=controller_values, plant_values=plant_values)
     unit = r.unit if isinstance(r, Log) else "m"
     command = as_samples(r.x_d if isinstance(r, Log) else r, "r")
-    as_samples(command[:1], "r", 1)
     ahead: FmuController | LibraryController | _OwnController
     if isinstance(controller, (str, Path)):
         _refuse(t_init, "t_init is for a controller of the library; an FMU's is among its controller_values")
@@ -108,7 +109,7 @@ def cosimulate(
     else:
         _refuse(controller_values, "controller_values are for an FMU; make the controller with these parameters")
         if isinstance(controller, HybridPredictor | SepCompensator):
-            ahead = LibraryController(controller, t_init)
+            ahead = LibraryController(controller, t_init, unit)
         else:
             _refuse(t_init, "t_init is for a controller of the library; a compensator of your own has none")
             ahead = _OwnController(controller)
@@ -118,6 +119,7 @@ def cosimulate(
         drive = FmuDrive(plant, plant_values or {})
     else:
         _refuse(plant_values, "plant_values are for an FMU; make the plant with these parameters")
+        check_kind(Encoder | None, encoder=encoder)
         drive = _LibraryDrive(plant, encoder or Encoder())
     with one_blas_thread, ExitStack() as stack:
         for adapter in (ahead, drive):
@@ -127,6 +129,10 @@ def cosimulate(
         ahead.initialise(start)
         drive.initialise(start)
         delay, T_s = ahead.delay, ahead.T_s
+        if isinstance(r, Log):
+            check_interval("the log", r.T_s, ahead.name, T_s)
+        else:
+            as_samples(r, "r", T_s=T_s)
         if drive.T_s is not None and abs(drive.T_s - T_s) > 1e-6 * T_s:
             raise FmuError(f"{drive.name} has T_s = {drive.T_s:g} s, but {ahead.name} has {T_s:g} s; they must agree")
         kind, n = ahead.kind, len(command) + delay
@@ -183,8 +189,8 @@ class LibraryController:
     delay: int
     late: int
 
-    def __init__(self, controller: HybridPredictor | SepCompensator, t_init: float | None) -> None:
-        self._controller, self._t_init = controller, t_init
+    def __init__(self, controller: HybridPredictor | SepCompensator, t_init: float | None, unit: str = "m") -> None:
+        self._controller, self._t_init, self._unit = controller, t_init, unit
         self.kind: ControllerType
         if isinstance(controller, SepCompensator):
             self.kind, predictor, self.delay = COMPENSATOR, controller.predictor, controller.preview
@@ -194,7 +200,7 @@ class LibraryController:
 
     def initialise(self, start: float) -> None:
         """Begin a run at rest at ``start``, m."""
-        self._look_ahead = LookAhead(self._controller, start, t_init=self._t_init)
+        self._look_ahead = LookAhead(self._controller, start, t_init=self._t_init, unit=self._unit)
 
     def outputs(self) -> tuple[tuple[float, ...], int]:
         """Return the positions of the kind's outputs, m, and the state, now."""
@@ -221,6 +227,7 @@ class _OwnController:
     late: int = 0
 
     def __init__(self, compensator: Compensator) -> None:
+        check_has("controller", compensator, "T_s", "delay", "restart", "step")
         self._compensator = compensator
         self.T_s: float = check("T_s", compensator.T_s, label="the compensator's T_s")
         self.delay = self.Np = int(check("Np", compensator.delay, label="the compensator's delay"))
@@ -248,6 +255,7 @@ class _LibraryDrive:
     T_s: float | None = None  # sampling interval, s; None if it can be any
 
     def __init__(self, plant: Plant, encoder: Encoder) -> None:
+        check_has("plant", plant, "reset", "step")
         self.plant: Any = plant  # passed to ``disturb``
         self._encoder = encoder
 

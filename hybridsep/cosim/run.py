@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import metrics
-from ..base.files import atomic_open, write_whole
+from ..base.files import as_path, atomic_open, write_whole
 from ..base.signals import Array
 from ..online.look_ahead import SepState
 
@@ -83,7 +83,7 @@ class Run:
     measurement_delay : int
         Samples by which measurements arrived late at the controller; −1: a sample early, and it held them.
     unit : {"m", "rad"}
-        Unit of the positions, of a log that says so; figures that are called ``_um`` are µrad then.
+        Unit of the positions, of a log that says so; figures that are called ``_um``, in µm, are ``_urad`` then.
     """
 
     kind: ControllerType
@@ -118,8 +118,9 @@ class Run:
 
     def _figures(self) -> dict[str, float | int]:
         summary = self.summary()
-        names = ("rms_pb_um", "rms_hold_um", "rms_h_um", "tracking_rms_um", "tracking_max_um", "change_max_um")
-        return metrics.in_unit({name: summary[name] for name in ("n_samples", *names) if name in summary}, self.unit)
+        names = ("rms_pb", "rms_hold", "rms_h", "tracking_rms", "tracking_max", "change_max")
+        shown = ("n_samples", *(f"{name}_u{self.unit}" for name in names))
+        return {name: summary[name] for name in shown if name in summary}
 
     @property
     def active(self) -> NDArray[np.bool_]:
@@ -152,13 +153,14 @@ class Run:
 
     def prediction_figures(self) -> dict[str, float | int]:
         """Return RMS and largest errors, µm, over the whole trajectory, of the measured position unless named true."""
-        return {
+        figures = {
             **metrics.Score.of(self.x_meas - np.stack((self.x_pb, self.x_hold, self.x_h))).figures(),
             "rms_pb_true_um": 1e6 * metrics.rms(self.x - self.x_pb),
             "rms_h_true_um": 1e6 * metrics.rms(self.x - self.x_h),
             "servo_error_rms_um": 1e6 * metrics.rms(self.error),
             "n_samples": len(self.t),
         }
+        return metrics.in_unit(figures, self.unit)
 
     def tracking_figures(self) -> dict[str, float | int]:
         """Return tracking errors, change of the command and shares of the models over the whole trajectory.
@@ -175,7 +177,7 @@ class Run:
         names = ("peak_velocity_m_s", "peak_acceleration_m_s2", "peak_jerk_m_s3")
         figures |= dict(zip(names, metrics.peak_derivatives(self.x_dm, self.T_s), strict=True))
         figures |= {f"share_{one.name.lower()}": float(np.mean(self.state == one)) for one in SepState}
-        return {**figures, "n_samples": len(self.t)}
+        return metrics.in_unit({**figures, "n_samples": len(self.t)}, self.unit)
 
     def batch_rms(self) -> dict[str, Array]:
         """Return the RMS errors of each window, m, ``(n_batches,)``, of ``x_pb``, ``x_hold`` and ``x_h``."""
@@ -196,7 +198,7 @@ def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
 
     ValueError if the suffix is another one.
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = path.suffix.lower()
     if suffix == ".npz":
         with atomic_open(path) as archive:

@@ -7,14 +7,14 @@ this replay) and the hybrid ``x_h`` of eq. (4). During the warm-up all three pub
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.errors import SignalError
+from ..base.errors import SignalError, brief, check_kind
 from ..base.metrics import Score, batch_rms, hold, html_table, in_unit, line_plot, one_line
-from ..base.signals import PREDICTION_MAX, Array, as_measured, as_samples, check_same_index
+from ..base.signals import PREDICTION_MAX, Array, as_array, as_measured, as_samples, check_interval, check_same_index
 from ..base.threads import one_blas_thread
 from ..cosim.run import PREDICTOR, Run
 from ..logs.log import Log, Table, is_table, read_log
@@ -24,6 +24,8 @@ from .verdict import Verdict, judge
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+_FASTER = 100.0  # ratio of the usual motion to the fastest that was learned from which the unit is another: mm are 1000
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -57,7 +59,8 @@ class Backtest:
 
     def summary(self) -> dict[str, float | int]:
         """Return the figures of both scores; those with ``_after_warm_up`` are NaN if nothing is left."""
-        return {"n_batches": self.n_batches, **self.overall.figures(), **self.after_warm_up.figures("_after_warm_up")}
+        scores = {**self.overall.figures(), **self.after_warm_up.figures("_after_warm_up")}
+        return in_unit({"n_batches": self.n_batches, **scores}, self.unit)
 
     def __repr__(self) -> str:
         return one_line("Backtest", self._figures())
@@ -72,8 +75,8 @@ class Backtest:
         return line_plot(np.arange(float(self.n_batches)), lines, "window", f"RMS prediction error [µ{self.unit}]")
 
     def _figures(self) -> dict[str, float | int]:
-        names = ("n_samples", "n_batches", "rms_pb_um", "rms_hold_um", "rms_h_um")
-        return in_unit({name: self.summary()[name] for name in names}, self.unit)
+        names = in_unit(dict.fromkeys(("n_samples", "n_batches", "rms_pb_um", "rms_hold_um", "rms_h_um")), self.unit)
+        return {name: self.summary()[name] for name in names}
 
 
 @one_blas_thread
@@ -95,7 +98,8 @@ def backtest(
         It learns the log on the way.
     x_d, x_meas : (n,) array_like, m
         Commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it is missing. Or a
-        :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments, or a table that is read as one.
+        :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments, or a table that is read as one. Arrays
+        in another unit are a log of :func:`~hybridsep.logs.log.read_log`.
     starts : sequence of int
         First samples of the segments, which gaps separate: another run begins with each, and what was learned is kept.
     progress : callable, optional
@@ -103,28 +107,40 @@ def backtest(
 
     Raises
     ------
+    ParameterError
+        If the samples are not as far apart as the predictor's.
     SignalError
-        If the samples are empty, of different lengths or not finite; the predictor is unchanged then. If the prediction
-        diverges.
+        If the samples are empty, of different lengths, not finite, or move a hundred times as fast as all that was
+        learned, as in another unit; the predictor is unchanged then. If the prediction diverges.
     """
+    check_kind(HybridPredictor, predictor=predictor)
+    check_kind(Callable, progress=progress)
+    T_s = predictor.T_s
     if is_table(x_d):
-        x_d = read_log(cast("Table", x_d), T_s=predictor.T_s)
+        x_d = read_log(cast("Table", x_d), T_s=T_s)
     unit = x_d.unit if isinstance(x_d, Log) else "m"
     if isinstance(x_d, Log):
-        if abs(x_d.T_s - predictor.T_s) > 0.01 * predictor.T_s:
-            raise SignalError(f"the log has T_s = {x_d.T_s:g} s, the predictor {predictor.T_s:g} s; they must agree")
+        check_interval("the log", x_d.T_s, "the predictor", T_s)
         x_meas, starts, x_d = x_d.x_meas, x_d.starts, x_d.x_d
     check_same_index(x_d=x_d, x_meas=x_meas)
-    command = as_samples(x_d, "x_d")
+    command = as_samples(x_d, "x_d", T_s=T_s)
     predictor.settings.check_replay()
-    measured = as_measured(x_meas, "x_meas", len(command))
+    measured = as_measured(x_meas, "x_meas", len(command), T_s=T_s)
+    learned: Any = predictor.residual.learned  # of the paper's model no speed
+    fastest, steps = getattr(learned, "largest_step", 0.0), np.abs(np.diff(command))
+    if len(moving := steps[steps > 0.0]) and np.median(moving) > _FASTER * fastest > 0.0:
+        raise SignalError(
+            f"x_d must be in m or rad: it moves {np.median(moving):.3g} a sample, of {fastest:.3g} at most that were "
+            "learned; read_log({'x_d': x_d, 'x': x}, T_s=…, unit='mm') makes a log of arrays in another unit"
+        )
     if not predictor.settings.averaging and (missing := np.isnan(measured)).any():
         raise SignalError(
             f"x_meas must be finite, got nan at sample {np.argmax(missing)}: missing measurements need averaging = true"
         )
     n, Np, delay = len(command), predictor.Np, predictor.settings.n_late
-    if n == 0:
-        raise SignalError("a log must have at least one sample, got none")
+    ends = np.append(as_array(starts, "starts"), n)
+    if ends[0] != 0.0 or not (np.diff(ends) >= 1.0).all() or (ends % 1.0).any():
+        raise SignalError(f"starts must be whole numbers from 0 on that rise and are below {n}, got {brief(starts)}")
     n_rejected, parts = 0, []
     for begin, end in zip(starts, (*starts[1:], n), strict=True):
         if begin:

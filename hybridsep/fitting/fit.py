@@ -2,21 +2,20 @@
 
 import errno
 import json
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import IdentificationError, ParameterError, brief, listed
-from ..base.files import plain, write_whole
+from ..base.errors import IdentificationError, ParameterError, SignalError, check_kind, listed
+from ..base.files import as_path, plain, write_whole
 from ..base.metrics import html_table, line_plot
+from ..base.parameters import finite
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, CompensatorSettings, PredictorSettings
-from ..base.signals import Array, as_samples
+from ..base.signals import Array, as_samples, check_interval
 from ..base.threads import one_blas_thread
 from ..base.version import __version__
 from ..compensate.compensator import SepCompensator
@@ -100,7 +99,9 @@ class Fit:
         (scale, unit), best = self.judged.unit, self.judged.replay.best()
         hybrid = self.judged.replay.scored()[-1]
         errors = f"hybrid {scale * hybrid.rms:.3g} {unit} RMS, {best.name} {scale * best.rms:.3g} {unit}"
-        return f"Fit({self.machine.name}: Np = {self.judged.replay.Np}, positions in {self.unit}, {errors})"
+        notes = dict.fromkeys(one.name for found in self.findings.values() for one in found)
+        said = f"; findings: {', '.join(notes)}" if notes else ""
+        return f"Fit({self.machine.name}: Np = {self.judged.replay.Np}, positions in {self.unit}, {errors}{said})"
 
     def _repr_html_(self) -> str:
         scale, unit = self.judged.unit
@@ -135,9 +136,15 @@ class Fit:
         """Return what is predicted, with what was learned, of a window ``(n,)`` from rest at its first command.
 
         It has at most ``Np`` commanded positions, in :attr:`unit`, as what is predicted; a quantity may have another.
+        SignalError if there are more, or they cannot be used.
         """
-        factor = si_factor(self.unit)
-        found, scale = self.predictor().predict(as_samples(x_d, "x_d", factor=factor)), 1.0 / factor("")
+        factor, predictor = si_factor(self.unit), self.predictor()
+        command = as_samples(x_d, "x_d", factor=factor, T_s=predictor.T_s)
+        if len(command) > predictor.Np:
+            raise SignalError(
+                f"x_d must have at most Np = {predictor.Np} samples, got {len(command)}; backtest takes more"
+            )
+        found, scale = predictor.predict(command), 1.0 / factor("")
         return replace(found, x_pb=scale * found.x_pb, e_h=scale * found.e_h, x_h_std=scale * found.x_h_std)
 
     def plot(self) -> "Figure":
@@ -155,16 +162,17 @@ class Fit:
 
         OSError if it cannot be written, or ``path`` is a folder.
         """
-        if Path(path).is_dir():
+        if as_path(path).is_dir():
             raise IsADirectoryError(errno.EISDIR, "the report's path must be a file", str(path))
         fmus, judged = [fmus] if isinstance(fmus, str) else fmus, self.judged
+        check_kind(Sequence, fmus=fmus)
         report = begun_report(
             *(f"Axis {self.machine.name}: from its log to its FMU", self.logs, judged, "Tested on held-out samples"),
             "The first half of each log trained the physics model and chose the settings; these are the errors of the "
             f"second half.{settling_words(judged.replay)}",
         )
         if in_position is not None:
-            write_moves(report, judged, in_position)
+            write_moves(report, judged, finite(in_position, "in_position", above=0.0))
         write_findings(report, self.logs, self.findings)
         write_identification(report, self.identification, judged)
         write_validation(report, self.identification, judged)
@@ -196,9 +204,12 @@ class Fit:
         ``fmus`` and ``report`` say whether they are among them; ``in_position`` is the report's; ``progress`` is
         told a message and the fraction done.
         """
-        if Path(out).exists() and not Path(out).is_dir():
+        out = as_path(out, "out")
+        check_kind(bool | np.bool_, fmus=fmus, report=report)
+        check_kind(Callable, progress=progress)
+        if out.exists() and not out.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "out must be a folder", str(out))
-        files = fit_files(Path(out), self.machine.name, compensator=self.tracking is not None)
+        files = fit_files(out, self.machine.name, compensator=self.tracking is not None)
         archives = {what: path for what, path in files.items() if path.suffix == ".fmu"}
         for what in [*([] if report else ["report"]), *([] if fmus else archives)]:
             del files[what]
@@ -301,9 +312,9 @@ def fit(
         If a log is too short to be split.
     """
     checked_name(name)
-    for what, value, kind in (("p", p, Iterable), ("columns", columns, Mapping), ("cascade", cascade, Mapping)):
-        if value is not None and (not isinstance(value, kind) or isinstance(value, str)):
-            raise ParameterError(f"{what} must be a {kind.__name__.lower()}, got {brief(value)}")
+    check_kind(Sequence | None, p=p)
+    check_kind(Mapping | None, cascade=cascade)
+    check_kind(Callable, progress=progress)
     if unknown := set(cascade or ()) - Cascade.parameters().keys():
         raise ParameterError(f"cascade has {', '.join(Cascade.parameters())}, got {listed(sorted(unknown))}")
     gains = None if cascade is None else Cascade(**cascade)
@@ -314,7 +325,11 @@ def fit(
         raise ParameterError(f"what is known of an axis must be of {', '.join(names)}, got {listed(sorted(unknown))}")
     Np = None if Np is None else PARAMETERS["Np"].checked(Np)
     logs = _logs(x_d, x, {"T_s": T_s, "unit": unit, "columns": columns, "axis": axis})
-    T_s, shown = _common(logs), logs[0].shown
+    T_s, shown = logs[0].T_s, logs[0].shown
+    for log in logs[1:]:
+        check_interval(log.path.name, log.T_s, logs[0].path.name, T_s)
+        if log.unit != logs[0].unit:
+            raise ParameterError(f"{log.path.name} is in {log.unit}, {logs[0].path.name} in {logs[0].unit}")
     findings = {log.path.name: checked(log) for log in logs}
     window = max(1, round(_LOOK_AHEAD / T_s)) if Np is None else Np
     recordings = [
@@ -331,8 +346,7 @@ def fit(
     settings_to_try(default, p)  # which refuses what does not fit into the window
     ahead = None
     if look_ahead is not None:
-        if not isinstance(look_ahead, Real) or isinstance(look_ahead, bool) or not 0.0 < look_ahead < math.inf:
-            raise ParameterError(f"look_ahead must be a time, s, got {look_ahead!r}")
+        look_ahead = finite(look_ahead, "look_ahead", above=0.0)
         label = f"look_ahead = {look_ahead:g} s, in samples of {T_s:g} s,"
         ahead = PARAMETERS["preview"].checked(round(look_ahead / T_s), label)
 
@@ -391,17 +405,6 @@ def _logs(x_d: Any, x: ArrayLike | None, reading: Mapping[str, Any]) -> tuple[Lo
     if given := [name for name, value in {"x": x, **reading}.items() if value is not None]:
         raise ParameterError(f"{listed(given, str)} must be left out where a Log is given, which has said them")
     return logs
-
-
-def _common(logs: Sequence[Log]) -> float:
-    """Return the sampling interval of all logs, s; ParameterError if they differ in it or in the unit."""
-    T_s = logs[0].T_s
-    for log in logs[1:]:
-        if abs(log.T_s - T_s) > 0.01 * T_s:
-            raise ParameterError(f"{log.path.name} is sampled every {log.T_s:g} s, {logs[0].path.name} every {T_s:g} s")
-        if log.unit != logs[0].unit:
-            raise ParameterError(f"{log.path.name} is in {log.unit}, {logs[0].path.name} in {logs[0].unit}")
-    return T_s
 
 
 def _identified(

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from ..base.errors import FmuError
-from ..base.files import atomic_open
+from ..base.errors import FmuError, check_kind
+from ..base.files import as_path, atomic_open
 from ..machines.machine import Machine
 from . import native, python
 from .compile import ALL_TARGETS, default_targets, expanded
@@ -76,6 +76,8 @@ def build_fmu(
     StateError
         If ``weights`` is no saved predictor, or one of another machine or other settings.
     """
+    check_kind(str, name=name)
+    check_kind(Sequence | None, targets=targets)
     names = fmu_names(machine, flavour, fmi)
     if name not in names:
         raise FmuError(f"machine {machine.name} has no FMU {name!r}; it has {', '.join(names)}")
@@ -89,7 +91,7 @@ def build_fmu(
             raise FmuError(f"{what} are for a {' or a '.join(models)}, {name} is a {model}")
     if embed_weights and (weights is None or flavour != "native"):
         raise FmuError("embed_weights is for a native FMU with weights")
-    path = Path(out) / f"{name}.fmu"
+    path = as_path(out, "out") / f"{name}.fmu"
     with atomic_open(path) as file:
         learned = saved_weights(weights, machine, model)
         spec = FmuSpec.of(machine, model, flavour=flavour, fmi=fmi, samples=samples, weights=learned, windows=windows)

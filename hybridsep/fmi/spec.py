@@ -10,7 +10,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ..base.errors import FmuError
+from ..base.errors import FmuError, check_kind
 from ..base.files import DEFAULT_MACHINE
 from ..base.settings import PARAMETERS
 from ..base.signals import Array, as_samples
@@ -62,9 +62,7 @@ class FmuSpec:
         FmuError if the flavour is unknown, or has no FMUs of this version of FMI; SignalError if ``samples`` is not
         finite or empty.
         """
-        played = None if samples is None else as_samples(samples, "samples")
-        if played is not None:
-            as_samples(played[:1], "samples", 1)
+        played = None if samples is None else as_samples(samples, "samples", T_s=machine.T_s)
         name, built_in = fmu_name(model, machine.name, flavour, fmi), {"samples": played is not None}
         table = table_of(machine, model, name, **built_in, warm=weights is not None, windows=windows, rest=rest)
         return cls(machine, table, flavour, fmi, played, weights)
@@ -108,6 +106,8 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSI
 
     FmuError if the flavour is unknown, or has no FMUs of this version of FMI.
     """
+    check_kind(Machine, machine=machine)
+    check_kind(str, flavour=flavour, fmi=fmi)
     models = ["HybridPredictor"]
     if machine.drive_limits is not None and flavour == "native":
         models.append("SepCompensator")

@@ -177,7 +177,6 @@ def build_system(
     check_system(machine, compensate=compensate, ssp=ssp)
     fmi = FMI_VERSIONS[SSP_VERSIONS.index(ssp)]
     samples = as_samples(command, "command")
-    as_samples(samples[:1], "command", 1)
     model, look_ahead, sent = (
         ("HybridPredictor", "predictor", "x_d") if compensate is None else ("SepCompensator", "compensator", "x_dm")
     )

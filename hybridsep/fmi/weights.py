@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import StateError
+from ..base.files import as_path
 from ..base.state import numbers_of, with_numbers
 from ..predict.predictor import HybridPredictor
 from ..predict.regression import RidgeRegression
@@ -126,7 +127,7 @@ def saved_weights(path: str | Path | None, machine: "Machine", kind: str) -> byt
 
 
 def _load_trained(path: str | Path, machine: "Machine", kind: str) -> HybridPredictor:
-    path = Path(path)
+    path = as_path(path, "weights")
     try:
         trained = HybridPredictor.load(path)
     except StateError as error:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from ..base.errors import LogError
@@ -188,8 +189,8 @@ class _Following(NamedTuple):
     left: float  # share of its variance that the best mixture of the other's earlier samples leaves, 0 … 1
     gain: float  # sum of the mixture's weights
     lag: float  # their mean lag, samples
-    gain_at_one: float  # weight of the best single lag
-    lag_of_one: int  # that lag, samples
+    gain_at_one: float  # weight of about the lag below alone
+    lag_of_one: int  # the lag with which the two correlate best, samples
 
 
 def following(u: Array, x: Array) -> _Following:
@@ -197,9 +198,7 @@ def following(u: Array, x: Array) -> _Following:
     known = np.isfinite(x)
     largest = min(_LAG_MAX, len(u) // 4)
     lags = np.concatenate(([0], np.unique(np.round(np.geomspace(1.0, max(largest, 1), _LAGS)).astype(np.intp))))
-    k = np.arange(len(u))
-    A = np.stack([u[np.maximum(k - lag, 0)] for lag in lags], axis=1)[known]
-    A, y = A - A.mean(axis=0), x[known] - x[known].mean()
+    A, y = _lagged(u, lags, known), x[known] - x[known].mean()
     scale, total = float(np.abs(A).max()), float(np.abs(y).max())
     if not (0.0 < scale < math.inf and 0.0 < total < math.inf):
         return _Following(1.0, 0.0, 0.0, 0.0, 0)
@@ -207,6 +206,9 @@ def following(u: Array, x: Array) -> _Following:
     squares, products = (A * A).sum(axis=0), A.T @ y
     singly = products**2 * np.sign(products) / np.where(squares > 0.0, squares, np.inf) / float(y @ y)
     one = int(np.argmax(singly))
+    near = np.arange(lags[max(one - 1, 0)], lags[min(one + 1, len(lags) - 1)] + 1)
+    between = _lagged(u, near, known) / scale
+    best = np.argmax(between.T @ y / np.sqrt(np.maximum((between * between).sum(axis=0), 1e-300)))
     basis, R = np.linalg.qr(A)
     h, _ = nnls(R, basis.T @ y, maxiter=len(lags) ** 2)
     left = float(np.sum((y - A @ h) ** 2) / (y @ y))
@@ -216,8 +218,14 @@ def following(u: Array, x: Array) -> _Following:
         gain * total / scale,
         float(h @ lags) / gain if gain > 0.0 else 0.0,
         float(products[one] / squares[one]) * total / scale if squares[one] > 0.0 else 0.0,
-        int(lags[one]),
+        int(near[best]),
     )
+
+
+def _lagged(u: Array, lags: Indices, known: NDArray[np.bool_]) -> Array:
+    """Return a signal, (n,), at rest before, by some lags, without its means, ``(n_known, n_lags)``."""
+    found = np.stack([u[np.maximum(np.arange(len(u)) - lag, 0)] for lag in lags], axis=1)[known]
+    return np.asarray(found - found.mean(axis=0))
 
 
 def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Finding]:
@@ -365,14 +373,15 @@ def _note_rate(log: Log) -> Iterator[Finding]:
 
 def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterator[Finding]:
     """Note a measured position that is late, or counts from another zero."""
-    if found.lag * log.T_s > _LATE and found.lag < 1.5 * found.lag_of_one:  # noise spreads a mixture over lags
+    late, least = found.lag_of_one, "at least " if found.lag_of_one >= min(_LAG_MAX, len(x_d) // 4) else ""
+    if late * log.T_s > _LATE and found.lag < 1.5 * late:  # noise spreads a mixture over lags
         words = (
-            f"the measured position lags its command by {found.lag:.3g} samples ({found.lag * log.T_s:.3g} s), drive, "
-            "dead time and recorder together"
+            f"the measured position lags its command by {least}{late} samples ({late * log.T_s:.3g} s), drive, dead "
+            "time and recorder together"
         )
         options = (("--delay N", "where the recorder is known to be N samples late"),)
-        yield Finding("late", words, {"lag": found.lag * log.T_s}, options=options)
-    error = x - x_d[np.maximum(np.arange(len(x_d)) - found.lag_of_one, 0)]
+        yield Finding("late", words, {"lag": late * log.T_s}, options=options)
+    error = x - x_d[np.maximum(np.arange(len(x_d)) - late, 0)]
     way = np.sign(np.diff(x_d, prepend=x_d[0]))  # in one direction alone a lag looks like an offset
     parts = [part for part in (error[way == one] for one in (-1.0, 0.0, 1.0)) if np.isfinite(part).sum() > _SAMPLES_MIN]
     medians = [float(np.nanmedian(part)) for part in parts]

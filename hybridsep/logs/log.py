@@ -8,13 +8,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from numbers import Integral
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import LogError, ParameterError, brief
+from ..base.errors import LogError, ParameterError, brief, check_kind
 from ..base.settings import check
 from ..base.signals import Array, Indices
 from .arrays import TableSource
@@ -152,6 +153,9 @@ def read_log(
         If the file, its columns or its times cannot be used.
     """
     given = check_reading(unit, T_s)
+    check_kind(Mapping | None, columns=columns)
+    check_kind(Integral, delay=delay)
+    check_kind(bool | np.bool_, resample=resample)
     if isinstance(recording, str | Path):
         source: Source = open_source(Path(recording))
     elif is_table(recording):

@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import IO, Any, ClassVar
@@ -37,12 +38,17 @@ _DELIMITERS = (";", "\t", ",", None)  # delimiters by precedence; None is blanks
 _NO_UNITS = ("", "-", "1", "[-]")  # entries of a row of units where a column has none
 _BLANK = -math.inf  # stands for a blank cell of the command until it is filled
 
-_MISSING = re.compile(r"[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?n/a|null|none", re.IGNORECASE)
-"""Spellings of a missing number: of C libraries, R, databases and Excel."""
+_MISSING = re.compile(
+    r"[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?n/a|<na>|null|none|-{1,3}", re.IGNORECASE
+)
+"""Spellings of a missing number: of C libraries, R, databases, Excel and pandas; and dashes."""
 
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
 _BELOW_1000 = re.compile(r"[+-]?\d{1,3}")
 _NOT_THOUSANDS = re.compile(r",(?!\d{3}(?!\d))")
+
+_COMMA, _QUOTED, _POINT = map(re.compile, (",", r'"[^",]+,', r"(?<![\w.:])(\d+\.|\.\d)\d*(?![\d.:])"))
+"""What a line has that has a comma within a number, or in quotation marks, or a number with a point."""
 
 _SECOND = 1_000_000_000  # in nanoseconds, which doubles count exactly over a day
 
@@ -77,6 +83,7 @@ class _Table:
     units: dict[str, str]  # name → unit, from a row of units below the names
     delimiter: str | None  # between columns; None is blanks
     comma: str | None  # what a comma in a number stands for: ".", nothing between thousands; None where it is an error
+    sign: re.Pattern[str] | None  # what shows, where a line below the first ones has it, that a comma may be another
     header: int  # line number of the names, from 1
     first: int  # line number from which numbers are read
     clocks: set[int]  # indices of columns of timestamps with a time of day
@@ -115,6 +122,17 @@ class TextSource(Source):
         self.stamps = frozenset(self.names[i] for i in table.clocks)
         self._left_out: list[tuple[int, str]] = []
         self._held = 0
+
+    @cached_property
+    def _comma(self) -> str | None:
+        """What a comma in a number stands for, by all rows: numbers may pass 1000 far below the first ones."""
+        table, sign = self._table, self._table.sign
+        with self._open() as file:
+            if sign is None or not any(map(sign.search, islice(file, table.first - 1, None))):
+                return table.comma
+        with self._open() as file:
+            rows = [split(text.strip(" \r\n"), table.delimiter) for text in islice(file, table.first - 1, None)]
+        return _comma([[row[i] for row in rows if i < len(row)] for i in range(len(table.names))])[0]
 
     @staticmethod
     def recognises(head: bytes) -> bool:
@@ -191,7 +209,7 @@ class TextSource(Source):
     def _rows(self, numbered: list[tuple[int, str]], use: list[int]) -> Array:
         """Return the columns ``use`` of some lines, ``(n_lines, n_use)``, timestamps as times of day, ns."""
         mark, expected = self._table.delimiter, len(self._table.names)
-        comma = self._table.comma if mark != "," else None
+        comma = self._comma if mark != "," else None
         whole = comma is not None and not (comma == "" and any(_NOT_THOUSANDS.search(text) for _, text in numbered))
         lines = [text.replace(",", comma or "") if whole else text for _, text in numbered]
         widths = [text.count(mark) + 1 for text in lines] if mark else [len(text.split()) for text in lines]
@@ -240,7 +258,7 @@ class TextSource(Source):
 
     def _number(self, field: str) -> float:
         """Return a number; ValueError if it is none, or a comma in it has no meaning in this file."""
-        comma = self._table.comma
+        comma = self._comma
         if "," in field and (comma is None or (comma == "" and not _THOUSANDS.fullmatch(field))):
             raise ValueError(field)
         return _number(field.replace(",", comma or ""))
@@ -355,7 +373,7 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
         return None
     number, line = known[0]
     mark = next((mark for mark in _DELIMITERS if mark and mark in line), None)
-    return _Table(_names(line, mark), {}, mark, ".", number, number + 1, set())
+    return _Table(_names(line, mark), {}, mark, ".", None, number, number + 1, set())
 
 
 def _width(fields: Sequence[str]) -> int:
@@ -395,10 +413,11 @@ def _with_names(
     nearest = above[has_units:][:2]  # the one with more known names counts
     header, names = max(nearest, key=lambda row: n_known(row[1]) if len(row[1]) == len(nearest[0][1]) else -1)
     units = dict(zip(names, above[0][1], strict=False)) if has_units else {}
-    columns = [[row[i] for row in fields if _is_written(row[i])] for i in range(width) if not kinds[i]]
+    comma, settled = _comma([[row[i] for row in fields] for i in range(width)])
+    sign = _POINT if settled else _QUOTED if delimiter == "," else _COMMA
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
-    return _Table(names, stated, delimiter, _comma(columns), header, rows[start][0], clocks)
+    return _Table(names, stated, delimiter, comma, sign, header, rows[start][0], clocks)
 
 
 def _is_written(text: str) -> bool:
@@ -406,24 +425,26 @@ def _is_written(text: str) -> bool:
     return is_number(decimal_points(text)) or bool(_THOUSANDS.fullmatch(text))
 
 
-def _comma(columns: Sequence[Sequence[str]]) -> str | None:
-    """Return what a comma in columns of numbers as they are written stands for."""
+def _comma(columns: Sequence[Sequence[str]]) -> tuple[str | None, bool]:
+    """Return what a comma in the numbers of columns of texts stands for, and whether it cannot be of thousands."""
+    columns = [list(filter(_is_written, column)) for column in columns]
     numbers = [text for column in columns for text in column]
     commas = [text for text in numbers if "," in text]
     points = any("." in text for text in numbers)
     several = any(text.count(",") > 1 for text in commas)
-    if commas and all(map(_THOUSANDS.fullmatch, commas)) and (points or several or any(map(_passes_1000, columns))):
-        return ""
-    return None if points else "."
+    settled = not all(map(_THOUSANDS.fullmatch, commas))
+    if commas and not settled and (points or several or any(map(_passes_1000, columns))):
+        return "", False
+    return None if points else ".", settled
 
 
 def _passes_1000(column: Sequence[str]) -> bool:
     """Return whether only whole numbers below 1000 lack a comma, and neighbours are closer if it is of thousands."""
-    written = [text for text in column if not _MISSING.fullmatch(text)]
-    plain = [text for text in written if "," not in text]
-    if not 0 < len(plain) < len(written) or not all(map(_BELOW_1000.fullmatch, plain)):
+    column = [text for text in column if not _MISSING.fullmatch(text)]
+    plain = [text for text in column if "," not in text]
+    if not 0 < len(plain) < len(column) or not all(map(_BELOW_1000.fullmatch, plain)):
         return False
-    grouped, decimal = ([float(text.replace(",", mark)) for text in written] for mark in ("", "."))
+    grouped, decimal = ([float(text.replace(",", mark)) for text in column] for mark in ("", "."))
     return max(abs(b - a) for a, b in pairwise(grouped)) < max(abs(b - a) for a, b in pairwise(decimal))
 
 

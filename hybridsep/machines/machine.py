@@ -13,8 +13,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from ..base.errors import MachineError, ParameterError, brief, first_line, listed
-from ..base.files import data_folder
+from ..base.errors import MachineError, ParameterError, brief, check_kind, first_line, listed
+from ..base.files import as_path, data_folder
 from ..base.parameters import Parameter, angular_unit
 from ..base.settings import PARAMETERS, Cascade, CompensatorSettings, Limits, PredictorSettings, Settings
 from ..model.physics import ModalModel, Mode
@@ -135,6 +135,7 @@ class Machine(FileSection):
 
         ParameterError if they are out of range or inconsistent.
         """
+        check_kind(Mapping, values=values)
         if section:
             values = {section: {**self.table.get(section, {}), **values}}
         return machine_from_table({**self.table, **values})
@@ -179,7 +180,10 @@ class Machine(FileSection):
         """
         self.check_section("plant")
         assert self.plant is not None
-        values = {**self.plant.values("kind", "noise_std", "seed", "mode"), **changes}
+        values = self.plant.values("kind", "noise_std", "seed", "mode")
+        if unknown := changes.keys() - values:
+            raise ParameterError(f"the plant has {', '.join(values)}, got {listed(sorted(unknown))}")
+        values |= changes
         if isinstance(self.plant, FeedDriveSection):
             assert self.physics.spring_mass_damper is not None  # by check
             return FeedDrive(**self.physics.spring_mass_damper.values(), **values)
@@ -245,7 +249,7 @@ def machine_names() -> list[str]:
 
 def machine_path(machine: str | Path) -> Path:
     """Return the machine file of a path or of a bundled machine's name; MachineError if there is none."""
-    path = Path(machine)
+    path = as_path(machine, "machine")
     if path.is_file():
         return path
     if path.suffix == ".toml":
@@ -268,6 +272,7 @@ def load_machine(machine: str | Path, changes: Iterable[str] = ()) -> Machine:
     MachineError if there is no such file, it is not TOML, or an entry is missing, unknown or out of range.
     """
     path = machine_path(machine)
+    check_kind(Iterable, changes=changes)
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:  # an integer of 5000 digits is a ValueError, too
@@ -282,6 +287,7 @@ def load_machine(machine: str | Path, changes: Iterable[str] = ()) -> Machine:
 
 def _parsed(change: str) -> dict[str, Any]:
     """Return the tables that ``ENTRY=VALUE`` stands for."""
+    check_kind(str, change=change)
     entry, equals, value = change.partition("=")
     for line in (change, f"{entry}={json.dumps(value.strip())}") if equals else ():
         try:
@@ -304,15 +310,6 @@ def machine_from_table(content: Mapping[str, Any]) -> Machine:
     if machine is None:
         raise ParameterError(listed(problems, str, "; "))
     return machine
-
-
-def check_interval(name: str, T_s: float, axis: Machine) -> None:
-    """Raise ParameterError if a file's sampling interval is not the machine's."""
-    if abs(T_s - axis.T_s) > 0.01 * axis.T_s:
-        raise ParameterError(
-            f"{name} is sampled every {T_s:g} s, but machine {axis.name} has T_s = {axis.T_s:g} s; resample the file, "
-            "say its unit of time in the column's name, or correct T_s"
-        )
 
 
 def check_unit(name: str, log: "Log", axis: Machine) -> None:

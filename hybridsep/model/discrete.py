@@ -39,7 +39,7 @@ class DiscreteModel:
             self.A[mode, mode], self.b[mode], d = discretised_block(A[mode, mode], b[mode], self.T_s, input_hold)
             self.d += float(c[mode] @ d)
         self._n = len(self.b)
-        self._block = max(1, min(block, BLOCK_MAX))
+        self._block = min(check("Np", block, label="block"), BLOCK_MAX)
         # Lifted matrices for windows of up to ``block`` samples
         m, n = self._block, self._n
         self._powers = np.empty((m + 1, n, n))  # A⁰ … Aᵐ

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.errors import ModelError, ParameterError
+from ..base.errors import ModelError, ParameterError, check_kind
 from ..base.settings import Cascade, check
-from ..base.signals import Array
+from ..base.signals import Array, as_array
 from .discrete import BLOCK_MAX, DiscreteModel
 
 if TYPE_CHECKING:
@@ -70,8 +70,11 @@ class ModalModel:
     dead_time: int = 0
 
     def __init__(self, modes: Sequence[Mode], dead_time: int = 0) -> None:
+        check_kind(Sequence, modes=modes)
         if not modes:
             raise ParameterError("a modal model needs at least one mode, got none")
+        for one in modes:
+            check_kind(Mode, mode=one)
         if len(modes) > MODES_MAX:
             raise ParameterError(f"a modal model has at most {MODES_MAX} modes, got {len(modes)}")
         object.__setattr__(self, "modes", tuple(modes))
@@ -99,6 +102,7 @@ class ModalModel:
     @classmethod
     def cascade(cls, gains: Cascade, dead_time: int = 0) -> ModalModel:
         """Return the closed loops of a drive, a mass with viscous friction, of given gains; ModelError if unstable."""
+        check_kind(Cascade, gains=gains)
         s, Tv = np.polynomial.Polynomial([0.0, 1.0]), gains.Tv
         force = gains.Kv * (Tv * s + 1.0) if Tv else gains.Kv + 0.0 * s
         velocity = (Tv * s if Tv else 1.0) * (gains.inertia * s + gains.viscous) + force
@@ -182,7 +186,7 @@ class ModalModel:
         """
         if self.dead_time and T_s is None:
             raise ParameterError(f"T_s is needed: dead_time = {self.dead_time} is counted in samples")
-        s = 1j * np.asarray(omega, dtype=np.float64)
+        s = 1j * as_array(omega, "omega")
         # Eq. (15)
         G = sum(
             (mode.alpha + mode.beta * s) / (s**2 + 2 * mode.zeta * mode.omega * s + mode.omega**2)

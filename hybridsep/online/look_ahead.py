@@ -18,8 +18,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ..base.errors import SignalError
-from ..base.settings import samples_before
+from ..base.errors import SignalError, check_has
+from ..base.settings import check, samples_before
 from ..base.signals import Array, check_position
 from ..base.state import FIXED, arrays_of, pack, restored, restoring, unpack
 from ..predict.predictor import HybridPredictor
@@ -193,11 +193,12 @@ class LookAhead:
     def __init__(
         self, model: HybridPredictor | Planner, start: float, *, t_init: float | None = None, unit: str = "m"
     ) -> None:
+        check_has("model", model, "restart", "update")
         self.unit = unit
         self._hold(model, 0)
-        warm_up = self.predictor.settings.warm_up if t_init is None else t_init
+        warm_up = self.predictor.settings.warm_up if t_init is None else check("t_init", t_init)
         check_position("the start value of x_d_ahead", start, unit=unit)
-        self._at_rest(start)
+        self._at_rest(float(start))  # of a whole number the arrays would be of whole numbers
         self._first_scored += samples_before(warm_up, self.predictor.T_s)
         self.planner.restart(self.start, t_init=warm_up, lead_in=self.delay)
         self.window = self.planner.plan(self._ahead.copy(), self._loads.copy())
@@ -354,8 +355,7 @@ class LookAhead:
         if self.diverged:
             raise SignalError(self.diverged)
         for name, value in (("x_d_ahead", x_d_ahead), ("x_meas", x_meas), ("x_load", x_load)):
-            if not (name == "x_meas" and math.isnan(x_meas) and self.may_miss):
-                check_position(name, value, f" at sample {self.k}", self.unit)
+            check_position(name, value, f" at sample {self.k}", self.unit, may_miss=name == "x_meas" and self.may_miss)
 
     def to_bytes(self) -> bytes:
         """Return the complete state, predictor and planner included, as a versioned blob."""

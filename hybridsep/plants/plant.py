@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.clock import check_step_size
-from ..base.errors import ParameterError, SignalError
+from ..base.errors import ParameterError, check_has
+from ..base.parameters import finite
 from ..base.settings import check
 from ..base.signals import Array, as_samples
 
@@ -44,10 +45,9 @@ def simulate(plant: Plant, x_d: ArrayLike, T_s: float, *, start: float | None = 
     ``x_d``, (n,), m: commanded positions; ``T_s``: sampling interval, s; ``start``: initial position, m, the first
     command if left out. Returns (n,), m: true positions ``x(k)``, before ``x_d(k)`` acts.
     """
-    commands = as_samples(x_d, "x_d")
-    if len(commands) == 0:
-        raise SignalError("x_d must have at least one sample, got none")
-    plant.reset(float(commands[0]) if start is None else start)
+    check_has("plant", plant, "reset", "step")
+    commands = as_samples(x_d, "x_d", T_s=check("T_s", T_s))
+    plant.reset(float(commands[0]) if start is None else finite(start, "start"))
     x = np.empty(len(commands))
     for k, command in enumerate(commands.tolist()):
         x[k] = plant.x

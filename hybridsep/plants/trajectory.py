@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import ParameterError, SignalError
+from ..base.errors import ParameterError, SignalError, check_kind
+from ..base.parameters import finite
 from ..base.settings import Limits, check, samples_before
 from ..base.signals import Array, as_samples
 from ..logs.log import read_log
@@ -63,27 +64,22 @@ def rest_to_rest(
         If a move starts before the one before has ended, the times do not fit, or it would have more than
         :data:`SAMPLES_MAX` samples.
     SignalError
-        If ``positions`` has less than one move or is not finite.
+        If ``positions`` has less than one move or is not finite, or ``start_times`` are not as many as the moves.
     """
     T_s = check("T_s", T_s)
     points = as_samples(positions, "positions")
     if len(points) < 2:
         raise SignalError(f"positions must hold the start and at least one target, got {len(points)} values")
-    if start_times is not None and len(start_times) != len(points) - 1:
-        raise ParameterError(
-            f"start_times must have one time for each of {len(points) - 1} moves, got {len(start_times)}"
-        )
-    if not (np.isfinite(dwell) and dwell >= 0):
-        raise ParameterError(f"dwell must be finite and ≥ 0 s, got {dwell!r}")
-    moves, begin = [], 0.0
+    times = None if start_times is None else as_samples(start_times, "start_times", len(points) - 1).tolist()
+    dwell, moves, begin = finite(dwell, "dwell", least=0.0), [], 0.0
     for i, (here, there) in enumerate(pairwise(points.tolist())):
-        start = begin if start_times is None else float(start_times[i])
+        start = begin if times is None else times[i]
         if start < begin - 1e-6 * T_s:
             raise ParameterError(f"move {i + 1} starts at {start:g} s, before the one before has ended at {begin:g} s")
         move = _plan(here, there, limits)
         moves.append((start, move))
-        begin = start + move.duration + (dwell if start_times is None else 0.0)
-    end = begin if duration is None else duration
+        begin = start + move.duration + (dwell if times is None else 0.0)
+    end = begin if duration is None else finite(duration, "duration")
     if end < begin - 1e-6 * T_s:
         raise ParameterError(f"duration is {end:g} s, but the moves need {begin:g} s")
     if not end / T_s < SAMPLES_MAX:
@@ -142,11 +138,8 @@ def read_trajectory(
 
 def archimedean_spiral(radius: float, turns: float) -> tuple[_Curve, _Curve, float]:
     """Return ``r = radius · θ / θ_end`` as position, derivative and end parameter for :func:`along_path`."""
-    for name, value in (("radius", radius), ("turns", turns)):
-        if not (np.isfinite(value) and value > 0):
-            raise ParameterError(f"{name} must be finite and > 0, got {value!r}")
-    end = 2 * np.pi * turns
-    pitch = radius / end
+    end = 2 * np.pi * finite(turns, "turns", above=0.0)
+    pitch = finite(radius, "radius", above=0.0) / end
 
     def position(theta: Array) -> Array:
         return pitch * np.stack((theta * np.cos(theta), theta * np.sin(theta)), axis=-1)
@@ -181,6 +174,7 @@ def _plan(here: float, there: float, limits: Limits) -> "ruckig.Trajectory":
     """Return ruckig's time-optimal move between two points at rest."""
     import ruckig
 
+    check_kind(Limits, limits=limits)
     request = ruckig.InputParameter(1)
     request.current_position, request.target_position = [here], [there]
     request.max_velocity, request.max_acceleration = [limits.velocity], [limits.acceleration]

@@ -13,9 +13,9 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import ParameterError, SignalError, StateError
-from ..base.files import write_whole
-from ..base.settings import PredictorSettings, samples_before
+from ..base.errors import ParameterError, SignalError, StateError, check_kind
+from ..base.files import as_path, write_whole
+from ..base.settings import PredictorSettings, check, samples_before
 from ..base.signals import Array, as_measured, as_samples
 from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..base.threads import one_blas_thread
@@ -89,6 +89,9 @@ class HybridPredictor:
         start: float | None = None,
         disturbances: Sequence[Disturbance] = (),
     ) -> None:
+        check_kind(ModalModel, model=model)
+        check_kind(PredictorSettings | None, settings=settings)
+        check_kind(Sequence, disturbances=disturbances)
         self.settings = settings = PredictorSettings() if settings is None else settings
         self.Np, self.T_s = settings.Np, settings.T_s
         self.model, self.disturbances, self.planned = model, tuple(disturbances), 0
@@ -142,6 +145,7 @@ class HybridPredictor:
 
     def differences(self, trained: "HybridPredictor") -> list[str]:
         """Return, in words, what a predictor has with which its weights cannot be taken; its window may be another."""
+        check_kind(HybridPredictor, trained=trained)
         found, expected = (
             {**one.learned_with, "input_hold": one.settings.input_hold, "disturbances": len(one.disturbances)}
             for one in (trained, self)
@@ -180,12 +184,10 @@ class HybridPredictor:
         ``path``, (m,), m: commands of its preview before they are modified; with averaging ``scales`` of the features.
         Both from ``x_d`` if left out. SignalError if ``x_d`` is empty, not one-dimensional or not finite.
         """
-        command, state = as_samples(x_d, "x_d"), self.state
+        command, state = as_samples(x_d, "x_d", T_s=self.T_s), self.state
         n, late = len(command), len(state.late)
-        if n == 0:
-            raise SignalError("x_d must have at least one sample, got none")
         start = float(command[0]) if state.start is None else state.start
-        path = np.concatenate((state.late, (command if path is None else path) - start))
+        path = np.concatenate((state.late, (command if path is None else as_samples(path, "path")) - start))
         command = np.concatenate((state.late, command - start))
         x_pb, _ = self.discrete.forced_response(state.physics, command)  # Eq. (2)
         forecast = state.residual.forecast(ResidualWindow(command, x_pb, start, path), scales)
@@ -218,7 +220,7 @@ class HybridPredictor:
             raise SignalError("update must follow predict: there is no predicted window to measure")
         state, forecast, error = self.state, cast(Any, self.pending.forecast), self.pending.error
         residual, physics, may_miss = state.residual, state.physics, self.settings.averaging
-        measured = as_measured(x, "x") if may_miss else as_samples(x, "x")
+        measured = (as_measured if may_miss else as_samples)(x, "x", T_s=self.T_s)
         if not 1 <= len(measured) <= self.n_pending:
             raise SignalError(f"x must have 1 … {self.n_pending} samples, as predicted, got {len(measured)}")
         m, start, late = len(measured), forecast.window.start, len(state.late)
@@ -245,15 +247,12 @@ class HybridPredictor:
 
         It is the hybrid model, during the warm-up too.
 
-        ParameterError with averaging, whose model is not affine in the commands; SignalError if ``n < 1``, or the
+        ParameterError with averaging, whose model is not affine in the commands, or if ``n < 1``; SignalError if the
         initial position is neither given nor known from a predicted window.
         """
         if self.settings.averaging:
             raise ParameterError("the operator needs the paper's model, averaging = false")
-        length = self.Np if n is None else n
-        if length < 1:
-            raise SignalError(f"n must be ≥ 1, got {length}")
-        g_pb, free_pb, start = self._physics_from_rest(length)
+        g_pb, free_pb, start = self._physics_from_rest(self.Np if n is None else n)
         g_h, free = cast(PaperModel, self.residual).operator(g_pb, free_pb)
         late = len(self.state.late)
         return WindowOperator(
@@ -270,6 +269,7 @@ class HybridPredictor:
 
     def _physics_from_rest(self, n: int) -> tuple[Array, Array, float]:
         """Return the first column of ``G_pb``, its free response from the late samples on, and the start."""
+        n = check("Np", n, label="n")
         start = self.start if self.start is not None or self.pending is None else self.pending.forecast.window.start
         if start is None:
             raise SignalError("the start is not known yet: give start= or predict the first window before")
@@ -384,4 +384,4 @@ class HybridPredictor:
 
         StateError if the file is not a saved predictor, or was learned with another number of disturbances.
         """
-        return cls.from_bytes(Path(path).read_bytes(), disturbances)
+        return cls.from_bytes(as_path(path).read_bytes(), disturbances)

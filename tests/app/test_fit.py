@@ -283,7 +283,7 @@ def test_the_machine_is_named_after_log_and_axis(file: str, axis: str | None, na
 
 def test_what_cannot_be_is_refused(log: Path) -> None:
     found = read_log(log)
-    with pytest.raises(ParameterError, match=r"axis\.csv is sampled every 0\.002 s, axis\.csv every 0\.001 s"):
+    with pytest.raises(ParameterError, match=r"axis\.csv is sampled every 0\.002 s, but axis\.csv has T_s = 0\.001 s"):
         fit([found, replace(found, T_s=2e-3)])
     with pytest.raises(ParameterError, match=r"axis\.csv is in rad, axis\.csv in m"):
         fit([found, replace(found, unit="rad")])

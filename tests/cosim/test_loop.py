@@ -227,7 +227,7 @@ def test_what_is_refused(fmus: BuiltFmus) -> None:
     predictor, compensator, plant, other = map(fmus, names)
     cases: list[tuple[tuple[Path, Path], list[float], dict[str, Any], str]] = [
         ((predictor, plant), [0.0, float("nan")], {}, "r must be finite, got nan at sample 1"),
-        ((predictor, plant), [], {}, "r must have 1 samples, got 0"),
+        ((predictor, plant), [], {}, "r must have at least one sample, got none"),
         ((compensator, plant), [0.0], {"controller_values": {"preview": 60}}, "preview must be ≥ Np"),
         ((predictor, plant), [0.0], {"plant_values": {"stiffness": 1.0}}, "has no variable 'stiffness'"),
         ((plant, predictor), [0.0], {}, r"FeedDrivePy.fmu is no predictor: it has no input x_d_ahead"),

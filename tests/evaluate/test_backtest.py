@@ -108,7 +108,7 @@ def test_perfect_physics_leaves_nothing_to_reduce() -> None:
 @pytest.mark.parametrize(
     ("x_d", "x", "message"),
     [
-        ([], [], "a log must have at least one sample, got none"),
+        ([], [], "x_d must have at least one sample, got none"),
         ([0.0, 1.0], [0.0], "x_meas must have 2 samples, got 1"),
         ([[0.0]], [[0.0]], r"x_d must be one-dimensional, got shape \(1, 1\)"),
         ([0.0, math.nan], [0.0, 0.0], "x_d must be finite, got nan at sample 1"),

@@ -1,5 +1,7 @@
 """``hybridsep.fit`` of arrays, a table and logs; what it returns."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from types import SimpleNamespace
@@ -116,5 +118,23 @@ def test_what_cannot_be_is_refused(axis: Fit, tmp_path: Path) -> None:
     with pytest.raises(LogError, match="all columns must have the same number of samples"):
         hybridsep.fit(X_D, X[1:], T_s=1e-3)
     slow = hybridsep.read_log({"x_d": X_D, "x": X}, T_s=2e-3)
-    with pytest.raises(SignalError, match=r"the log has T_s = 0\.002 s, the predictor 0\.001 s; they must agree"):
-        hybridsep.backtest(axis.predictor(), slow)
+    at_0 = hybridsep.LookAhead(axis.predictor(), 0)
+    calls: list[tuple[Callable[[], object], str]] = [
+        (lambda: axis.predict(np.zeros(NP + 1)), "x_d must have at most Np = 40 samples, got 41"),
+        (
+            lambda: hybridsep.backtest(axis.predictor(), slow),
+            r"the log is sampled every 0\.002 s, but the predictor has",
+        ),
+        (lambda: hybridsep.cosimulate(axis.predictor(), axis.machine.new_plant(), slow), "the log is sampled every"),
+        (lambda: hybridsep.backtest(axis.predictor(), 1e3 * X_D, 1e3 * X), "x_d must be in m or rad: it moves"),
+        (lambda: hybridsep.backtest(axis.predictor(), X_D, X, starts=(5,)), "starts must be whole numbers from 0 on"),
+        (lambda: axis.report(None), "path must be of type str or PathLike, got None"),  # type: ignore[arg-type]
+        (lambda: axis.build("a", progress=None), "progress must be of type Callable"),  # type: ignore[arg-type]
+        (lambda: at_0.sample(None, 0.0), "x_d_ahead must be a number, got None at sample 0"),  # type: ignore[arg-type]
+    ]
+    for call, message in calls:
+        with pytest.raises((ParameterError, SignalError), match=message):
+            call()
+    at_0.sample(0.5, 0.0)
+    assert at_0._ahead[0] == 0.5  # and no whole number
+    assert "rms_h_urad" in hybridsep.backtest(axis.predictor(), replace(log, unit="rad")).summary()

@@ -341,6 +341,7 @@ def test_what_is_noted_has_a_statistic_and_changes_nothing(name: str) -> None:
     found = {one.name: one for one in checked(log)}
     assert name in found
     assert found[name].evidence
+    assert name != "late" or "lags its command by 406 samples (0.406 s)" in found[name].words  # 6 of the drive
     assert str(found[name]).startswith(f"note: {name}: ")
 
 

@@ -13,7 +13,7 @@ import pytest
 from log_files import refused
 
 import hybridsep
-from hybridsep.base.errors import HybridSepError, LogError, SignalError
+from hybridsep.base.errors import HybridSepError, LogError, ParameterError, SignalError
 from hybridsep.base.signals import as_measured, as_samples
 from hybridsep.logs.log import read_log
 from hybridsep.logs.units import stated_unit
@@ -170,6 +170,9 @@ def test_labels_of_samples() -> None:
     kept = Labelled(1e-3 * X_D[~GONE], Labelled(np.flatnonzero(~GONE)))
     with pytest.raises(SignalError, match="the index of r must be even, it goes from 999 to 1100 at sample 1000; read"):
         hybridsep.cosimulate(predictor, machine.new_plant(), kept)
+    slower = Labelled(1e-3 * X_D, Labelled(np.datetime64("2026-03-05") + 2 * np.arange(N).astype("m8[ms]")))
+    with pytest.raises(ParameterError, match=r"the index of x_d is sampled every 0\.002 s"):
+        predictor.predict(slower)
     levels = Labelled(np.arange(N))
     levels.nlevels = 2  # type: ignore[attr-defined]
     refused(r"the index runs backwards; sort_index\(\)", Frame(np.arange(len(X))[::-1], x_d=X_D, x=X), T_s=1e-3)

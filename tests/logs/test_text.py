@@ -130,7 +130,8 @@ def test_recorded_texts(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "missing", ["NA", "N/A", "#N/A", "NULL", "null", "None", "nan", "NaN", "-nan(ind)", "1.#QNAN", "-1.#IND00", ""]
+    "missing",
+    ["NA", "N/A", "#N/A", "NULL", "null", "None", "nan", "-nan(ind)", "1.#QNAN", "-1.#IND00", "<NA>", "---", ""],
 )
 def test_spellings_of_a_missing_measurement(tmp_path: Path, missing: str) -> None:
     rows = [*ROWS[:10], f"0.010,3,{missing}", *ROWS[11:]]
@@ -186,11 +187,13 @@ def test_the_other_position_of_a_named_one(tmp_path: Path) -> None:
         ("0.000;1,000,000.5;1,000,000\n0.001;1,000,001.5;1,000,000\n", [1000.0005, 1000.0015]),
         ("0,000;120,000;119,999\n0,001;120,001;120,000\n", [0.12, 0.120001]),
         ("0.000;1;1\n0.001;1,20;1,201\n", r"line 3: column 'x_d \[um\]' must be a number, got '1,20'; .* of thousands"),
-        ("".join(f"{k / 1000:.3f};{k:,};{k:,}\n" for k in range(1010)), "line 1002: .* must be a number, got '1,000'"),
+        ("".join(f"{k / 1000:.3f};{k:,};{k:,}\n" for k in range(1010)), np.arange(1010.0) / 1e3),
+        ("".join(f"{k};{max(0, k - 500):,};{k:,}\n" for k in range(1600)), np.r_[np.zeros(500), :1100] / 1e3),
+        ("".join(f"{k};{k / 8:g};1\n".replace(".", ",") for k in range(1010)) + "1010;1.234;1\n", "line 3: .* '0,125'"),
     ],
 )
 def test_points_and_commas(tmp_path: Path, rows: str, right: Any) -> None:
-    """A file with both has thousands, or is refused."""
+    """A file with both has thousands, or is refused, wherever they begin."""
     path = write_csv(tmp_path / "log.csv", f"t [s];x_d [um];x [um]\n{rows}")
     if isinstance(right, str):
         refused(right, path)

@@ -104,17 +104,17 @@ def test_what_cannot_be_planned_is_refused() -> None:
         rest_to_rest([0, 0.01, 0.02], PAPER_LIMITS, start_times=[0.0, 0.1])
     with pytest.raises(ParameterError, match=r"duration is 0.1 s, but the moves need 0.143 s"):
         rest_to_rest([0, 0.01], PAPER_LIMITS, duration=0.1)
-    with pytest.raises(ParameterError, match="one time for each of 1 moves, got 2"):
+    with pytest.raises(SignalError, match="start_times must have 1 samples, got 2"):
         rest_to_rest([0, 0.01], PAPER_LIMITS, start_times=[0.0, 1.0])
     with pytest.raises(SignalError, match="at least one target, got 1"):
         rest_to_rest([0.0], PAPER_LIMITS)
     with pytest.raises(SignalError, match="positions must be finite, got nan at sample 1"):
         rest_to_rest([0.0, float("nan")], PAPER_LIMITS)
-    with pytest.raises(ParameterError, match=r"dwell must be finite and ≥ 0 s, got -0.05"):
+    with pytest.raises(ParameterError, match=r"dwell must be ≥ 0, got -0.05"):
         rest_to_rest([0.0, 0.01, 0.02], PAPER_LIMITS, dwell=-0.05)
-    with pytest.raises(ParameterError, match="a trajectory must have fewer than 2000000 samples, got inf s at"):
-        rest_to_rest([0.0, 0.01], PAPER_LIMITS, duration=float("inf"))
-    with pytest.raises(ParameterError, match="turns must be finite and > 0, got 0"):
+    with pytest.raises(ParameterError, match=r"a trajectory must have fewer than 2000000 samples, got 1e\+09 s at"):
+        rest_to_rest([0.0, 0.01], PAPER_LIMITS, duration=1e9)
+    with pytest.raises(ParameterError, match="turns must be > 0, got 0"):
         spiral(turns=0)
     with pytest.raises(ParameterError, match=r"T_s must be 1e-05 … 1 s, got 0"):
         rest_to_rest([0.0, 0.01], PAPER_LIMITS, 0.0)

@@ -14,6 +14,7 @@ import numpy as np
 from hybridsep.base.errors import MachineError, brief
 from hybridsep.base.files import plain
 from hybridsep.base.metrics import rms_ratio
+from hybridsep.base.signals import check_interval
 from hybridsep.base.threads import one_blas_thread
 from hybridsep.fitting.advice import Judged, advice_on
 from hybridsep.fitting.fit import fit
@@ -21,7 +22,7 @@ from hybridsep.fitting.replay import Recording, Replay, replay
 from hybridsep.fitting.report import begun_report, write_findings
 from hybridsep.logs.checks import Finding, checked, findings_table
 from hybridsep.logs.formats import open_source
-from hybridsep.machines.machine import Machine, check_interval, check_unit, load_machine, machine_name
+from hybridsep.machines.machine import Machine, check_unit, load_machine, machine_name
 from hybridsep.model.physics import Mode
 from hybridsep.predict.predictor import HybridPredictor
 
@@ -75,7 +76,7 @@ def _replayed(task: AxisTask, path: Path) -> _Judged:
     log = task.settings.read(path, task.axis)
     machine = _machine(task)
     check_unit(path.name, log, machine)
-    check_interval(path.name, log.T_s, machine)
+    check_interval(path.name, log.T_s, f"machine {machine.name}", machine.T_s)
     findings = {log.path.name: checked(log)}
     predictor = HybridPredictor(machine.model, machine.predictor_settings)
     recordings = [Recording(one.x_d, one.x_meas, 0) for one in log.segments()]

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from hybridsep.base.errors import HybridSepError, ParameterError, SignalError
+from hybridsep.base.signals import check_interval
 from hybridsep.logs.log import Log, check_reading, read_log
-from hybridsep.machines.machine import Machine, check_interval
+from hybridsep.machines.machine import Machine
 
 from .sample import AS_NAMED, MessageReader, Reading, RowReader, Sample
 
@@ -231,7 +232,7 @@ def open_source(
         if given.speed is not None:
             raise ParameterError(f"--speed is for a log; {address} comes at its own")
         if T_s is not None:
-            check_interval(address, T_s, machine)
+            check_interval(address, T_s, f"machine {machine.name}", machine.T_s)
     if address == "-":
         return LinesSource(sys.stdin.fileno(), reading, say)
     if udp is not None:
@@ -239,7 +240,7 @@ def open_source(
     if address.startswith("udp:") or "://" in address:
         raise ParameterError(f"SOURCE must be {FORMS}; got {address!r}")
     log = read_log(Path(address), columns=columns, unit=unit, T_s=given.T_s, axis=given.axis or own.axis)
-    check_interval(Path(address).name, log.T_s, machine)
+    check_interval(Path(address).name, log.T_s, f"machine {machine.name}", machine.T_s)
     if log.file_unit and unit is None and log.unit != machine.unit:
         raise ParameterError(
             f"{address} is in {log.unit}, but machine {machine.name} has unit = {machine.unit!r}; correct the machine "
