@@ -41,10 +41,7 @@ class ParameterError(HybridSepError, ValueError):
 
 
 def check_kind(kind: Any, **given: object) -> None:
-    """Raise ParameterError if what is given, by its name, is not of a type, or of one of a union of types.
-
-    A text, bytes or a truth value is only what is called so: no sequence, and no number.
-    """
+    """Raise ParameterError if what is given is of none of the types; a text is no sequence, a truth value no number."""
     kinds = getattr(kind, "__args__", (kind,))
     for name, value in given.items():
         if not isinstance(value, kind) or (type(value) in {str, bytes, bool} - {*kinds}):

@@ -110,10 +110,7 @@ def check_interval(name: str, T_s: float, other: str, expected: float) -> None:
 
 
 def as_array(values: Any, name: str, factor: _Factor = None, *, T_s: float | None = None) -> Array:
-    """Return numbers, NaN where they are missing; SignalError if they are none, in another unit, or have a gap.
-
-    An index of times, if they have one, must be ``T_s``, s, apart.
-    """
+    """Return numbers, NaN where missing; errors as of :func:`as_samples`, and SignalError of another unit or a gap."""
     if factor is None and type(values) is np.ndarray and values.dtype == np.float64 and values.flags.c_contiguous:
         return values
     if hasattr(values, "columns") or isinstance(values, Mapping):
@@ -176,10 +173,7 @@ def as_measured(values: Any, name: str, length: int | None = None, *, T_s: float
 
 
 def check_position(name: str, value: float, when: str = "", unit: str = "m", *, may_miss: bool = False) -> None:
-    """Raise SignalError if a position is not finite or beyond :data:`_POSITION_MAX`; ``when`` ends the message.
-
-    NaN, which is missing, passes where it ``may_miss``.
-    """
+    """Raise SignalError if a position, NaN where it ``may_miss``, is not finite or too large; ``when`` ends the text."""
     try:
         if math.isnan(value) and may_miss:
             return

@@ -25,7 +25,7 @@ from .verdict import Verdict, judge
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_FASTER = 100.0  # ratio of the usual motion to the fastest that was learned from which the unit is another: mm are 1000
+_FASTER = 100.0  # usual motion relative to the fastest that was learned from which the unit is another: mm are 1000
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -130,8 +130,8 @@ def backtest(
     fastest, steps = getattr(learned, "largest_step", 0.0), np.abs(np.diff(command))
     if len(moving := steps[steps > 0.0]) and np.median(moving) > _FASTER * fastest > 0.0:
         raise SignalError(
-            f"x_d must be in m or rad: it moves {np.median(moving):.3g} a sample, of {fastest:.3g} at most that were "
-            "learned; read_log({'x_d': x_d, 'x': x}, T_s=…, unit='mm') makes a log of arrays in another unit"
+            f"x_d must be in m or rad: it moves {np.median(moving):.3g} a sample, {fastest:.3g} at most were learned; "
+            "read_log({'x_d': x_d, 'x': x}, T_s=…, unit='mm') makes a log of arrays in another unit"
         )
     if not predictor.settings.averaging and (missing := np.isnan(measured)).any():
         raise SignalError(

@@ -141,9 +141,7 @@ class Fit:
         factor, predictor = si_factor(self.unit), self.predictor()
         command = as_samples(x_d, "x_d", factor=factor, T_s=predictor.T_s)
         if len(command) > predictor.Np:
-            raise SignalError(
-                f"x_d must have at most Np = {predictor.Np} samples, got {len(command)}; backtest takes more"
-            )
+            raise SignalError(f"x_d must have at most Np = {predictor.Np} samples, got {len(command)}")
         found, scale = predictor.predict(command), 1.0 / factor("")
         return replace(found, x_pb=scale * found.x_pb, e_h=scale * found.e_h, x_h_std=scale * found.x_h_std)
 
@@ -205,7 +203,6 @@ class Fit:
         told a message and the fraction done.
         """
         out = as_path(out, "out")
-        check_kind(bool | np.bool_, fmus=fmus, report=report)
         check_kind(Callable, progress=progress)
         if out.exists() and not out.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "out must be a folder", str(out))

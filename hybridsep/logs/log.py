@@ -155,7 +155,6 @@ def read_log(
     given = check_reading(unit, T_s)
     check_kind(Mapping | None, columns=columns)
     check_kind(Integral, delay=delay)
-    check_kind(bool | np.bool_, resample=resample)
     if isinstance(recording, str | Path):
         source: Source = open_source(Path(recording))
     elif is_table(recording):

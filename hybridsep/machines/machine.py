@@ -287,7 +287,6 @@ def load_machine(machine: str | Path, changes: Iterable[str] = ()) -> Machine:
 
 def _parsed(change: str) -> dict[str, Any]:
     """Return the tables that ``ENTRY=VALUE`` stands for."""
-    check_kind(str, change=change)
     entry, equals, value = change.partition("=")
     for line in (change, f"{entry}={json.dumps(value.strip())}") if equals else ():
         try:

@@ -130,8 +130,7 @@ def test_recorded_texts(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "missing",
-    ["NA", "N/A", "#N/A", "NULL", "null", "None", "nan", "-nan(ind)", "1.#QNAN", "-1.#IND00", "<NA>", "---", ""],
+    "missing", ["NA", "N/A", "#N/A", "NULL", "null", "nan", "-nan(ind)", "1.#QNAN", "-1.#IND00", "<NA>", "---", ""]
 )
 def test_spellings_of_a_missing_measurement(tmp_path: Path, missing: str) -> None:
     rows = [*ROWS[:10], f"0.010,3,{missing}", *ROWS[11:]]
