@@ -173,7 +173,7 @@ def as_measured(values: Any, name: str, length: int | None = None, *, T_s: float
 
 
 def check_position(name: str, value: float, when: str = "", unit: str = "m", *, may_miss: bool = False) -> None:
-    """Raise SignalError if a position, NaN where it ``may_miss``, is not finite or too large; ``when`` ends the text."""
+    """Raise SignalError if a position, NaN where it ``may_miss``, is not finite or too large, ``when`` at the end."""
     try:
         if math.isnan(value) and may_miss:
             return
