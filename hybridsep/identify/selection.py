@@ -169,8 +169,8 @@ def choose(candidates: Sequence[Candidate]) -> Candidate:
     if not chosen.slow_parts or not plain:
         return chosen
     other = _chosen_of(plain)
-    ratio = np.sqrt(chosen.fit.rms / other.fit.rms * chosen.rms_held_out / other.rms_held_out)
-    return chosen if ratio < _CANCELLING_WORTH else other
+    ratios = chosen.fit.rms / other.fit.rms, chosen.rms_held_out / other.rms_held_out
+    return chosen if max(np.sqrt(np.prod(ratios)), ratios[1]) < _CANCELLING_WORTH else other
 
 
 def without_long_delay(chosen: Candidate, segments: Sequence[Segment], T_s: float) -> Candidate:
