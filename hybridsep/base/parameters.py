@@ -12,13 +12,13 @@ from .errors import ParameterError, brief
 class Parameter:
     """One scalar parameter."""
 
-    name: str  # name in the FMU and in messages
     kind: type  # ``int``, ``float``, ``bool``, or ``str`` for one of ``choices``
-    unit: str  # SI unit in FMI's notation; ``"1"`` for a number
-    description: str  # one line
     default: Any  # value where none is given
     minimum: float  # closed bounds, maximum too, of the value in the FMU
     maximum: float
+    unit: str  # SI unit in FMI's notation; ``"1"`` for a number
+    description: str  # one line
+    name: str = ""  # name in the FMU and in messages
     display_unit: str | None = None  # unit in which tools show it
     nonzero: float = 0.0  # smallest non-zero magnitude, where 0 turns a feature off; 0 if there is none
     automatic: float | None = None  # value out of the range that stands for an automatic choice
@@ -127,18 +127,7 @@ def choice(default: str, choices: Mapping[str, str], description: str, **more: A
     return _declared(str, default, 0, len(choices) - 1, "1", description, **more)
 
 
-def _declared(
-    kind: type,
-    default: Any,
-    minimum: float,
-    maximum: float,
-    unit: str,
-    description: str,
-    *,
-    name: str = "",
-    unless_given: Any = ...,
-    **more: Any,
-) -> Any:
+def _declared(kind: type, default: Any, *more: Any, unless_given: Any = ..., **named: Any) -> Any:
     """Return a dataclass field; ``unless_given`` is the library's default where it is not the FMU's."""
-    parameter = Parameter(name, kind, unit, description, default, minimum, maximum, **more)
+    parameter = Parameter(kind, default, *more, **named)
     return field(default=default if unless_given is ... else unless_given, metadata={"parameter": parameter})

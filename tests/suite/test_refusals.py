@@ -77,7 +77,7 @@ def out_of_range(model: str) -> list[Case]:
             continue
         unit = "" if variable.unit in (None, "1") else f" {variable.unit}"
         more = {"nonzero": variable.nonzero, "automatic": variable.automatic}
-        declared = Parameter(variable.name, float, unit, "", None, least, most, **more)  # type: ignore[arg-type]
+        declared = Parameter(float, None, least, most, unit, "", variable.name, **more)  # type: ignore[arg-type]
         values: list[Value] = [2.0 * most, ODD[i % len(ODD)] if least >= 0.0 else 2.0 * least, math.nan]
         if variable.kind != "Real":
             values = [int(least) - 1, int(most) + 1]
