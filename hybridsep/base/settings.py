@@ -38,6 +38,8 @@ class Settings:
     ELSEWHERE: ClassVar[tuple[str, ...]] = ()
     """Fields that are no entries of these settings' own section of a machine file."""
 
+    PARTS: ClassVar[Mapping[str, type["Settings"]]] = {}  # fields that are settings themselves, or None
+
     def __init_subclass__(cls) -> None:
         declared = {name: one.metadata["parameter"] for name, one in vars(cls).items() if isinstance(one, Field)}
         lines = [f"{name} : {one.kind.__name__}\n        {one.help}." for name, one in declared.items()]
@@ -67,7 +69,9 @@ class Settings:
     @classmethod
     def fmi_parameters(cls) -> dict[str, Parameter]:
         """Return the parameters, nested settings included, by their names in FMUs."""
-        return {parameter.name: parameter for parameter in cls.parameters().values()}
+        found = {name: {one.name: one} for name, one in cls.parameters().items()}
+        found |= {name: part.fmi_parameters() for name, part in cls.PARTS.items()}
+        return {name: one for field in fields(cls) for name, one in found[field.name].items()}
 
     @classmethod
     def from_fmi(cls: type[_SettingsType], values: Mapping[str, Any]) -> _SettingsType:
@@ -88,13 +92,15 @@ class Settings:
 
     @classmethod
     def _from_checked(cls: type[_SettingsType], values: Mapping[str, Any]) -> _SettingsType:
-        parameters = cls.parameters().items()
-        return cls(**{name: values[parameter.name] for name, parameter in parameters if parameter.name in values})
+        own = {name: values[one.name] for name, one in cls.parameters().items() if one.name in values}
+        return cls(**own, **{name: part._from_checked(values) for name, part in cls.PARTS.items()})
 
     def to_fmi(self) -> dict[str, float | int | bool]:
         """Return the values of an FMU's variables, without fields that are None."""
         found = {parameter.name: (parameter, getattr(self, name)) for name, parameter in self.parameters().items()}
-        return {name: parameter.to_fmi(value) for name, (parameter, value) in found.items() if value is not None}
+        own = {name: parameter.to_fmi(value) for name, (parameter, value) in found.items() if value is not None}
+        parts = filter(None, (getattr(self, name) for name in self.PARTS))
+        return own | {name: value for part in parts for name, value in part.to_fmi().items()}
 
     @classmethod
     def from_table(cls: type[_SettingsType], table: Mapping[str, Any]) -> _SettingsType:
@@ -102,7 +108,8 @@ class Settings:
         names = [field.name for field in fields(cls)]
         if not isinstance(table, Mapping) or sorted(table) != sorted(names):
             raise ParameterError(f"settings must be {', '.join(names)}, got {brief(table)}")
-        return cls(**table)
+        parts = {name: part.from_table(table[name]) for name, part in cls.PARTS.items() if table[name] is not None}
+        return cls(**{**table, **parts})
 
     def _misfits(self) -> list[str]:
         """Return a message for each joint constraint that is violated."""
@@ -272,6 +279,7 @@ class CompensatorSettings(Settings):
 
     OPTIONAL: ClassVar[tuple[str, ...]] = ("preview", "spacing", "change_max", "horizon")
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("limits", "change_max", "following_error_max")
+    PARTS: ClassVar[Mapping[str, type[Settings]]] = {"limits": Limits}
 
     preview: int | None = whole(
         *(200, 8, 2000, "samples of the command that are planned ahead, at least Np + 4·spacing + 3"), unless_given=None
@@ -357,27 +365,6 @@ class CompensatorSettings(Settings):
         fits = preview >= Np + Np // 2 + 5 * spacing + PLAN_END
         horizon = min(look_ahead, _SPLINES * spacing) if self.horizon is None else self.horizon
         return replace(self, spacing=spacing, preview=preview, horizon=max(preview, horizon if fits else 0))
-
-    @classmethod
-    def fmi_parameters(cls) -> dict[str, Parameter]:
-        """Return the parameters, the limits' included, by their names in FMUs."""
-        own = list(super().fmi_parameters().items())
-        place = [name for name, _ in own].index("change_max")
-        return dict((*own[:place], *Limits.fmi_parameters().items(), *own[place:]))
-
-    @classmethod
-    def _from_checked(cls, values: Mapping[str, Any]) -> "CompensatorSettings":
-        return replace(super()._from_checked(values), limits=Limits._from_checked(values))
-
-    def to_fmi(self) -> dict[str, float | int | bool]:
-        """Return the values of an FMU's variables, without fields that are None."""
-        return {**super().to_fmi(), **({} if self.limits is None else self.limits.to_fmi())}
-
-    @classmethod
-    def from_table(cls, table: Mapping[str, Any]) -> "CompensatorSettings":
-        """Return the settings of plain values."""
-        settings = super().from_table(table)
-        return settings if settings.limits is None else replace(settings, limits=Limits.from_table(table["limits"]))
 
 
 _OTHERS = (
