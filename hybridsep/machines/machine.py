@@ -68,26 +68,12 @@ class Machine(FileSection):
             self.new_plant()  # raises if the combination is out of range
         _ = self.model  # raises if the mode of m, c and k is out of range
         if self.drive_limits is not None or "compensator" in self.table:
-            self._check_compensator()
-
-    def _check_compensator(self) -> None:
-        """Raise ParameterError if the compensator's predictor is out of range, or cannot plan by its own entries.
-
-        A delay of the predictor's is refused where a compensator is made: the file may be only for a predictor.
-        """
-        problems = []
-        try:
-            settings = self.compensator_predictor
-            if "measurement_delay" in self.compensator:
-                settings.check_planning()
-        except ParameterError as error:
-            problems.append(str(error))
-        try:
-            _ = self.compensator_settings
-        except ParameterError as error:
-            problems.append(str(error))
-        if problems:
-            raise ParameterError(f"compensator: {'; '.join(dict.fromkeys(problems))}")
+            try:
+                settings, _ = self.compensator_predictor, self.compensator_settings
+                if "measurement_delay" in self.compensator:  # the predictor's: the file may be only for that one
+                    settings.check_planning()
+            except ParameterError as error:
+                raise ParameterError(f"compensator: {error}") from error
 
     @property
     def model(self) -> ModalModel:
