@@ -76,14 +76,7 @@ TARGET_NAMES = ("host", "all", *TARGETS, *_FMI2_PLATFORMS)  # allowed targets
 
 
 Library = tuple[str, str]  # a kind and a platform, a key of :data:`TARGETS`
-
-
-@dataclass(frozen=True)
-class Compiler:
-    """A C compiler: its command, and a key that differs where its libraries may differ."""
-
-    command: tuple[str, ...]
-    name: str
+Compiler = tuple[tuple[str, ...], str]  # its command, and a key that differs where its libraries may differ
 
 
 def host_target() -> str:
@@ -126,7 +119,7 @@ def compiler_for(target: str) -> Compiler:
     """Return a platform's compiler: ``ziglang``, or for the host ``$CC``, cc, gcc or clang; FmuError without one."""
     if find_spec("ziglang") is not None:
         zig = (sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].triple, "-fno-sanitize=undefined")
-        return Compiler(zig, f"ziglang {version('ziglang')}")
+        return zig, f"ziglang {version('ziglang')}"
     if target != host_target():
         raise FmuError(
             f"compiling for {target} needs ziglang: pip install {ZIG.replace(' ', '==')}, or ask for the target host"
@@ -135,11 +128,11 @@ def compiler_for(target: str) -> Compiler:
     for command in (chosen, ["cc"], ["gcc"], ["clang"]):
         if command and shutil.which(command[0]):
             said = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
-            return Compiler(tuple(command), f"{' '.join(command)} {said}")
+            return tuple(command), f"{' '.join(command)} {said}"
     raise FmuError("no C compiler: no ziglang and none of $CC, cc, gcc, clang; pip install ziglang")
 
 
-def _compiled(folder: Path, library: Library, compiler: Compiler) -> bytes:
+def _compiled(folder: Path, library: Library, compiler: Sequence[str]) -> bytes:
     """Return the stripped shared library of ``all.c``, compiled and linked in a folder; FmuError if it is refused."""
     (kind, target), folder = library, folder.joinpath(*library)
     with named_errors(folder):
@@ -149,7 +142,7 @@ def _compiled(folder: Path, library: Library, compiler: Compiler) -> bytes:
     # dladdr is no part of POSIX
     flags = [*FLAGS, "-D_GNU_SOURCE", "-g0", "-s", "-shared", "-I."]
     output = f"{kind}{TARGETS[target].suffix}"
-    command = [*compiler.command, *flags, "all.c", "-o", output, *TARGETS[target].flags]
+    command = [*compiler, *flags, "all.c", "-o", output, *TARGETS[target].flags]
     done = subprocess.run(
         command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, errors="replace", check=False
     )
@@ -199,12 +192,12 @@ def library_paths(
     """
     paths = {library: kept(library) for library in wanted}
     compilers = {library: compiler_for(library[1]) for library, path in paths.items() if path is None}
-    paths |= {library: _place(compiler.name, library) for library, compiler in compilers.items()}
+    paths |= {library: _place(compiler, library) for library, (_, compiler) in compilers.items()}
     places = {library: path for library, path in paths.items() if path is not None}
     with TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count()) as pool:
         running = {
-            library: pool.submit(_compiled, Path(folder), library, compiler)
-            for library, compiler in compilers.items()
+            library: pool.submit(_compiled, Path(folder), library, command)
+            for library, (command, _) in compilers.items()
             if not places[library].is_file()
         }
         try:

@@ -7,7 +7,6 @@ of what is known of each channel, each with its key before it, then a column of 
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
@@ -24,14 +23,6 @@ _NAME, _UNIT, _SAMPLE_TIME, _START = "Name", "Unit", "SampleTime[ms]", "Starttim
 
 _HEAD_LINES = 400  # lines in which the numbers must begin
 _FILETIME, _COUNT, _MS = 1e12, 1e-7, 1e-3  # times above the first are Windows', in the second, s; others in ms
-
-
-@dataclass(frozen=True)
-class _Place:
-    """Column: its field in a line, and the field of its times."""
-
-    field: int
-    time: int
 
 
 class TwinCatSource(ArraysSource):
@@ -78,7 +69,7 @@ class TwinCatSource(ArraysSource):
         begin = _NAME.encode() + mark
         return first.startswith(begin) and mark in _MARKS and b"\n" + begin in b"\n" + rest
 
-    def _channels(self, first: tuple[int, list[str]]) -> dict[str, _Place]:
+    def _channels(self, first: tuple[int, list[str]]) -> dict[str, tuple[int, int]]:
         """Return the columns by name, times among them; set what is known of them."""
         row = self._known[_NAME]
         while row and not row[-1]:
@@ -91,27 +82,27 @@ class TwinCatSource(ArraysSource):
             )
         counts = Counter(row)
         symbols = self._known.get("SymbolName", [])
-        places: dict[str, _Place] = {}
+        places: dict[str, tuple[int, int]] = {}  # its field in a line, and the field of its times
         clocks: dict[int, str] = {}
         for i, cell in enumerate(row):
             if i in times:
                 clocks[i] = "time" if not clocks else f"time#{len(clocks) + 1}"
-                places[clocks[i]] = _Place(i, i)
+                places[clocks[i]] = i, i
                 continue
             name = cell if counts[cell] == 1 or i >= len(symbols) else symbols[i]
             while name in places:
                 name += "'"
-            places[name] = _Place(i, max(time for time in times if time < i))
+            places[name] = i, max(time for time in times if time < i)
         self.names = list(places)
-        self.times = {name: clocks[place.time] for name, place in places.items() if place.field != place.time}
+        self.times = {name: clocks[time] for name, (field, time) in places.items() if field != time}
         row_of_units, intervals = (self._known.get(key, []) for key in (_UNIT, _SAMPLE_TIME))
-        units = {name: _cell(row_of_units, places[name].field).partition("(")[0].strip() for name in self.times}
+        units = {name: _cell(row_of_units, places[name][0]).partition("(")[0].strip() for name in self.times}
         stated = {name: unit for name, unit in units.items() if unit}  # of ``mm (Length)``; ``(None)`` states none
         self.units = {**stated, **dict.fromkeys(clocks.values(), "s")}
         self._intervals = {
             name: 1e-3 * float(text)
             for name in self.times
-            if is_number(text := decimal_points(_cell(intervals, places[name].field)))
+            if is_number(text := decimal_points(_cell(intervals, places[name][0])))
         }
         fastest = min(self._intervals.values(), default=0.0)
         self._slow = {self.times[name] for name, interval in self._intervals.items() if interval > fastest}
@@ -119,16 +110,16 @@ class TwinCatSource(ArraysSource):
 
     def column(self, name: str) -> Array:
         """Return a channel down to its last sample, or times in s."""
-        place = self._places[name]
-        values = self._field(place.field, name)
+        field, time = self._places[name]
+        values = self._field(field, name)
         clock = self.times.get(name, name)
         if clock in self._slow:
-            values = values[np.diff(self._field(place.time, clock), prepend=np.nan) != 0.0]
+            values = values[np.diff(self._field(time, clock), prepend=np.nan) != 0.0]
         return values
 
     def _field(self, field: int, name: str) -> Array:
         """Return a field of all lines down to the last one that has it."""
-        is_time = field in {place.time for place in self._places.values()}
+        is_time = field in {time for _, time in self._places.values()}
         counted = is_time and self._counted
         rows = ((i, line.split(self._mark)) for i, line in reversed(list(enumerate(self._lines, start=1))))
         end = next((i for i, row in rows if _cell(row, field)), 0)

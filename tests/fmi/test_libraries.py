@@ -21,7 +21,6 @@ from hybridsep.fmi.compile import (
     ALL_TARGETS,
     TARGETS,
     ZIG,
-    Compiler,
     chosen_targets,
     compiler_for,
     default_targets,
@@ -121,7 +120,7 @@ def test_what_is_missing_is_compiled_once_all_of_it_together(without: Path, monk
     """In a wheel's installation in the user's cache; the compiler is a stand-in that makes a file of its arguments."""
     fill(without / "shipped", [("FeedDrive", target) for target in ALL_TARGETS[:2]])
     program = "import sys; open(sys.argv[sys.argv.index('-o') + 1], 'w').write(sys.argv[-1])"
-    compiler = Compiler((sys.executable, "-c", program), ZIG)
+    compiler = (sys.executable, "-c", program), ZIG
     monkeypatch.setattr(module, "compiler_for", lambda target: compiler)
     wanted = [(kind, target) for target in ALL_TARGETS[:3] for kind in ("FeedDrive", "StageDrive")]
     began: list[tuple[str, str]] = []
