@@ -29,7 +29,7 @@ def replay(machine: Machine, x_d: Array) -> tuple[Array, Backtest, list[float]]:
     predictor, poles = machine.new_predictor(), [0.0]
 
     def learned(_: float) -> None:
-        recursion = np.concatenate(([1.0], -predictor.residual_weights))
+        recursion = np.concatenate(([1.0], -predictor.residual.lag_weights))
         poles.append(float(np.max(np.abs(np.roots(recursion)))))
 
     return x, backtest(predictor, x_d, x, progress=learned), poles

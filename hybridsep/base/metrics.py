@@ -84,9 +84,7 @@ def coverage(error: Array, std: Array, level: float) -> float:
 
 def reduction_percent(rms_h: float, rms_pb: float) -> float:
     """Return the reduction of the RMS error from the physics model to the hybrid, %."""
-    if rms_pb == 0.0:
-        return 0.0 if rms_h == 0.0 else -math.inf
-    return 100.0 * (1.0 - rms_h / rms_pb)
+    return 100.0 * (1.0 - rms_ratio(rms_h, rms_pb))
 
 
 def rms_ratio(rms_h: float, rms_peer: float, least: float = 0.0) -> float:

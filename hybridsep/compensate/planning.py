@@ -200,7 +200,7 @@ class PaperPlanning(Planning):
         if most is SepState.OFF:
             return ChosenPlan(SepState.OFF, self.without_model(preview), None)
         learned = predictor.k >= predictor.n_init and predictor.regression.n_rows > 0
-        hybrid = most is SepState.HYBRID and learned and has_stable_poles(predictor.residual_weights)
+        hybrid = most is SepState.HYBRID and learned and has_stable_poles(predictor.residual.lag_weights)
         bounds = self.limits(preview)
         with np.errstate(all="ignore"):  # a hybrid model that is no candidate may be unstable
             operator = predictor.operator(self.horizon)  # Eq. (3)

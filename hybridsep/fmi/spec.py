@@ -107,7 +107,6 @@ def fmu_names(machine: Machine, flavour: str = FLAVOURS[0], fmi: str = FMI_VERSI
     FmuError if the flavour is unknown, or has no FMUs of this version of FMI.
     """
     check_kind(Machine, machine=machine)
-    check_kind(str, flavour=flavour, fmi=fmi)
     models = ["HybridPredictor"]
     if machine.drive_limits is not None and flavour == "native":
         models.append("SepCompensator")

@@ -115,8 +115,8 @@ def check(log: Log) -> tuple[Finding, ...]:
     refused = (*_unit(log), *(_meaning(log, x_d, x, given) if given else ()))
     if refused:
         return refused
-    notes = [note for notes in _NOTES for note in notes(log)]
-    notes += _note_held(log, given.lag_of_one if given else 0)
+    notes = (*_note_missing(log), *_note_rate(log), *_note_outliers(log), *_note_start(log))
+    notes += tuple(_note_held(log, given.lag_of_one if given else 0))
     return (*notes, *(_note_relation(log, x_d, x, given) if given else ()))
 
 
@@ -453,9 +453,6 @@ def _note_held(log: Log, lag: int) -> Iterator[Finding]:
         )
         evidence = {"n": float(n), "n_samples": float(last - first), "moved": float(moved[longest])}
         yield Finding(name, words, evidence)
-
-
-_NOTES = (_note_missing, _note_rate, _note_outliers, _note_start)
 
 
 def _travel(x: Array) -> float:

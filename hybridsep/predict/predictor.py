@@ -308,11 +308,6 @@ class HybridPredictor:
         return self.regression.weights
 
     @property
-    def residual_weights(self) -> Array:
-        """Autoregressive weights of the learned recursion, ``(p,)``."""
-        return self.residual.lag_weights
-
-    @property
     def n_pending(self) -> int:
         """Samples of the predicted window pending measurement; 0 if there is none."""
         return 0 if self.pending is None else len(self.pending.forecast.e_h) - len(self.state.late)
