@@ -133,7 +133,7 @@ def test_what_is_missing_is_compiled_once_all_of_it_together(without: Path, monk
 
 def test_a_library_is_kept_where_a_later_one_is_interrupted(without: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program = "import sys; open(sys.argv[sys.argv.index('-o') + 1], 'w')"
-    monkeypatch.setattr(module, "compiler_for", lambda target: Compiler((sys.executable, "-c", program), ZIG))
+    monkeypatch.setattr(module, "compiler_for", lambda target: ((sys.executable, "-c", program), ZIG))
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
     wanted = [("FeedDrive", target) for target in ALL_TARGETS[:3]]
 
@@ -192,4 +192,4 @@ def test_the_look_ahead_fmus_compile_for_every_platform(tmp_path: Path, target: 
         for file, content in module._sources(kind).items():
             (tmp_path / file).write_bytes(content)
         flags = ["-std=c99", "-O0", "-Wall", "-Wextra", "-Werror", "-D_GNU_SOURCE", "-I."]
-        output_of(*compiler_for(target).command, *flags, "-c", "all.c", "-o", "all.o", cwd=tmp_path)
+        output_of(*compiler_for(target)[0], *flags, "-c", "all.c", "-o", "all.o", cwd=tmp_path)
