@@ -186,8 +186,7 @@ class SepCompensator:
             path, loads, self._x_d_before[-3:], self._delta_before, self._previous_plan, self._state_before
         )
         fades = self.monitor.is_tripped or self.monitor.is_lost
-        compensate = SepState.OFF if fades else self.compensate
-        chosen = self._planning.choose(predictor, preview, compensate)
+        chosen = self._planning.choose(predictor, preview, SepState.OFF if fades else self.compensate)
         coefficients, stop = chosen.coefficients, self._last_stop
         if self._stop is not None:
             limits = self._planning.bounds.hard(command, self._x_d_before[-3:], self._delta_before)

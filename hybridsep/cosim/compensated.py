@@ -71,8 +71,7 @@ def train(machine: Machine, command: Array, path: Path) -> None:
     """Save what a machine's compensator learns in one run of the library over ``command``, ``(n,)``, m."""
     assert machine.plant is not None
     compensator = machine.new_compensator()
-    encoder = Encoder(machine.plant.noise_std, _TRAINING_SEED)
-    cosimulate(compensator, machine.new_plant(), command, encoder=encoder)
+    cosimulate(compensator, machine.new_plant(), command, encoder=Encoder(machine.plant.noise_std, _TRAINING_SEED))
     compensator.predictor.save(path)
 
 

@@ -50,12 +50,7 @@ class Verdict:
     def __str__(self) -> str:
         if self.n_windows < WINDOWS_MIN:
             return f"Nothing is judged: {counted(self.n_windows)}, at least {WINDOWS_MIN} are needed."
-        lines = [
-            f"Not compared with {peer}: its error is below what the log's resolution shows"
-            if math.isnan(value)
-            else f"{_comparison(value, peer)}{_where(value, places, self.judged)}"
-            for peer, value, places in zip(self.peers, self.ratios, self.worse, strict=True)
-        ]
+        lines = [_compared(*one, self.judged) for one in zip(self.peers, self.ratios, self.worse, strict=True)]
         lines += [f"Why: {self.cause}"] if self.cause else []
         if self.n_windows < WINDOWS_ENOUGH:
             lines.append(f"Judged by {counted(self.n_windows)} only")
@@ -169,17 +164,16 @@ def _ratio(own: float, other: float) -> float:
     return rms_ratio(math.sqrt(own), math.sqrt(other))
 
 
-def _comparison(value: float, peer: str) -> str:
+def _compared(peer: str, value: float, worse: tuple[str, ...], judged: tuple[str, ...]) -> str:
+    """Return how good the hybrid is beside a peer, and where it is worse; everywhere or nowhere, where that says it."""
+    if math.isnan(value):
+        return f"Not compared with {peer}: its error is below what the log's resolution shows"
     how = "As good as" if abs(value - 1.0) <= ALIKE else "Better than" if value < 1.0 else "Worse than"
     times = f"{value:.3g} × its RMS error" if math.isfinite(value) else "its RMS error is 0"
-    return f"{how} {peer}: {times}"
-
-
-def _where(value: float, worse: tuple[str, ...], judged: tuple[str, ...]) -> str:
-    """Return where the hybrid is worse; everywhere or nowhere, where that says it."""
-    if not worse:
-        return f", {_listed(judged)}" if value < 1.0 - ALIKE else ""
-    return ", everywhere" if worse == judged else f"; worse {_listed(worse)}"
+    where = f", {_listed(judged)}" if value < 1.0 - ALIKE else ""
+    if worse:
+        where = ", everywhere" if worse == judged else f"; worse {_listed(worse)}"
+    return f"{how} {peer}: {times}{where}"
 
 
 def _listed(places: tuple[str, ...]) -> str:

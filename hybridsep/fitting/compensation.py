@@ -134,14 +134,10 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, A
     """
     peaks, error = largest_motion(recordings, T_s)
     bounds = (*(MARGINS * peaks).tolist(), 2.0 * error, _FOLLOWING_ERROR * error)
-    values = dict(zip(DRIVE_LIMIT_ENTRIES, bounds, strict=True))
-    found: dict[str, Any] = {}
-    for name, value in values.items():
-        declared = DRIVE_LIMIT_ENTRIES[name]
-        if not value >= (declared.minimum or declared.nonzero):
-            return {}
-        found[name] = min(float(f"{value:.4g}"), float(declared.maximum or value))
-    return {**found, "estimated": True}
+    values = list(zip(DRIVE_LIMIT_ENTRIES.items(), bounds, strict=True))
+    if not all(value >= (one.minimum or one.nonzero) for (_, one), value in values):
+        return {}
+    return {**{name: min(float(f"{value:.4g}"), one.maximum) for (name, one), value in values}, "estimated": True}
 
 
 @dataclass(frozen=True)
@@ -471,8 +467,7 @@ class Stretch:
 def _expected(trial: Trial, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected:
     """Return the errors to be expected over the test samples, one log after the other; empty where a plan diverges."""
     settings = trial.machine.compensator_predictor
-    Np = settings.Np
-    firsts = [one.first_judged(Np) for one in recordings if len(one.x) > settings.n_late]
+    firsts = [one.first_judged(settings.Np) for one in recordings if len(one.x) > settings.n_late]
     try:
         found = trial.expected(settings, compensator, [(one.x_d, one.x) for one in recordings])
     except (SignalError, FmuError):

@@ -378,7 +378,7 @@ def fit(
     limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
     if given_limits:
         limits.pop("estimated", None)
-    machine = _machine(name, logs, model, settings, ahead, plant.entries, limits, required=bool(given_limits))
+    machine = _machine(name, logs, model, settings, ahead, plant.entries, limits)
     tracking = None
     if given_limits:
         tracking = expected_tracking(machine, recordings, stage("tracking error with compensation", 0.95, 1.0))
@@ -431,10 +431,8 @@ def _machine(
     look_ahead: int,
     plant: Mapping[str, Any],
     limits: Mapping[str, Any],
-    *,
-    required: bool,
 ) -> Machine:
-    """Return the machine; without limits that are not required where no compensator is possible with its look-ahead."""
+    """Return the machine; without limits that are estimated where no compensator is possible with its look-ahead."""
     sections: dict[str, Any] = {"plant": {"kind": "identified", **plant}} if plant else {}
     compensation = {"drive_limits": dict(limits)} if limits else {}
     known = {key: value for key in PredictorSettings.KNOWN if (value := getattr(settings, key))}
@@ -462,6 +460,6 @@ def _machine(
     try:
         return made(compensation)
     except ParameterError:
-        if required or not limits:
+        if "estimated" not in limits:
             raise
         return made({})

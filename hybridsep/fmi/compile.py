@@ -214,8 +214,7 @@ def library_paths(
 def kept(library: Library) -> Path | None:
     """Return the file of a library of the wheel, or one that was compiled before by :data:`ZIG`; None without one."""
     shipped = _SHIPPED / library[0] / f"{library[1]}{TARGETS[library[1]].suffix}"
-    places = (shipped, _place(ZIG, library))
-    return next((place for place in places if place.is_file()), None)
+    return next((place for place in (shipped, _place(ZIG, library)) if place.is_file()), None)
 
 
 def check_available(targets: Sequence[str]) -> None:

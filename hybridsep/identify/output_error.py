@@ -54,8 +54,7 @@ def as_segments(recordings: Iterable[tuple[ArrayLike, ArrayLike]]) -> list[Segme
 
 def motion_split(segments: Sequence[Segment], fraction: float) -> list[Segment]:
     """Return the segments with ``stop`` where that fraction of all commanded motion is over; 0 in later ones."""
-    total = sum(float(segment.motion[-1]) for segment in segments)
-    left = fraction * total
+    left = fraction * sum(float(segment.motion[-1]) for segment in segments)
     split = []
     for segment in segments:
         motion = segment.motion
@@ -216,7 +215,6 @@ def fit_structure(
 def simulated(fit: Fit, segment: Segment, T_s: float) -> Array:
     """Return the position of the fitted model, which starts at rest as the predictor does, ``(n,)``, m."""
     u = delayed(segment.u, fit.delay.samples)
-    sections = sections_of(fit.structure, fit.theta, T_s, fit.delay.input_hold)
-    columns = responses(fit.structure, sections, u)
+    columns = responses(fit.structure, sections_of(fit.structure, fit.theta, T_s, fit.delay.input_hold), u)
     gains, betas = fit.structure.gains(fit.linear)
     return columns @ np.concatenate((gains, betas if fit.structure.zero else []))

@@ -70,7 +70,9 @@ def residual_period(pieces: Iterable[tuple[Array, Array]], model: ModalModel, T_
     ).x
     if best <= lowest * (1.0 + 1e-3) or _predicted(s, known, e, best) < PREDICTED:
         return 0.0
-    return _rounded(1.0 / best, _RESOLVED / (best**2 * travel))
+    period, within = 1.0 / best, _RESOLVED / (best**2 * travel)
+    rounded = (float(f"{period:.{digits}e}") for digits in range(17))  # to as few digits as the resolution has
+    return next((one for one in rounded if abs(one - period) <= within), period)
 
 
 def _predicted(s: Array, known: Array, e: Array, line: float) -> float:
@@ -91,9 +93,3 @@ def _predicted(s: Array, known: Array, e: Array, line: float) -> float:
 def _waves(s: Array, line: float) -> Array:
     angle = 2.0 * np.pi * line * s
     return np.column_stack((np.sin(angle), np.cos(angle)))
-
-
-def _rounded(value: float, within: float) -> float:
-    """Return the number of fewest digits within a distance of a value."""
-    candidates = (float(f"{value:.{digits}e}") for digits in range(17))
-    return next((one for one in candidates if abs(one - value) <= within), value)

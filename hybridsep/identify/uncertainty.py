@@ -103,24 +103,21 @@ def _named(fit: Fit, covariance: Array, T_s: float, unit: str) -> tuple[Estimate
             physical += [np.exp(-theta[-1]), gains[-1]]
         return np.array(physical)
 
+    names, units = [("gain", "1")], {"f_n": "Hz", "zeta": "1", "alpha": "1/s2", "beta": "1/s"}
+    for i in range(fit.structure.n_modes):
+        names += [(f"mode[{i + 1}].{name}", unit_of) for name, unit_of in units.items()]
+    names += [("lag.tau", "s"), ("lag.gain", "1")] * fit.structure.lag
     slopes = _differences(values, point) if point.size else np.zeros((len(values(point)), 0))
     inner = covariance[: n_theta + n_linear, : n_theta + n_linear]
     deviations = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, inner, slopes), 0.0))
     found = [
         Estimate(name, float(value), float(deviation), unit_of)
-        for (name, unit_of), value, deviation in zip(_names(fit), values(point), deviations, strict=True)
+        for (name, unit_of), value, deviation in zip(names, values(point), deviations, strict=True)
     ]
     delay, offset = np.sqrt(np.maximum(np.diag(covariance)[-2:], 0.0))
     found.append(Estimate("dead_time", float(fit.delay.samples), float(delay), "samples"))
     found.append(Estimate("offset", fit.offset, float(offset), unit))
     return tuple(found)
-
-
-def _names(fit: Fit) -> list[tuple[str, str]]:
-    names, units = [("gain", "1")], {"f_n": "Hz", "zeta": "1", "alpha": "1/s2", "beta": "1/s"}
-    for i in range(fit.structure.n_modes):
-        names += [(f"mode[{i + 1}].{name}", unit) for name, unit in units.items()]
-    return names + [("lag.tau", "s"), ("lag.gain", "1")] * fit.structure.lag
 
 
 def _differences(function: Callable[[Array], Array], point: Array) -> Array:

@@ -67,9 +67,6 @@ class _GivenSource(ArraysSource):
                 self._refused[name] = LogError(f"{path}: column {brief(name)} must be numbers: {first_line(error)}")
         self.names = [*self._given, *self._refused]
         self.units = {name: one.unit for name, one in self._given.items() if one.unit}
-        self._find_stamps()
-
-    def _find_stamps(self) -> None:
         self.stamps = frozenset(name for name, one in self._given.items() if one.values.dtype.kind in "mM")
 
     def column(self, name: str) -> Array:
@@ -127,7 +124,8 @@ class TableSource(_GivenSource):
             labels = (labels - labels[0]) / usual
         self._given[name] = Given(labels)
         self.names, self.roles = [*self.names, name], {"t": name}
-        self._find_stamps()
+        if labels.dtype.kind in "mM":
+            self.stamps |= {name}
 
 
 def _columns_of(table: Any) -> dict[str, Any]:

@@ -269,11 +269,10 @@ def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]
     own: list[str] = []
     twins: dict[str, list[str]] = {}
     for i, name in enumerate(names):
-        if name and name in names[:i]:
-            twins.setdefault(name, []).append(f"{name}#{names[: i + 1].count(name)}")
-            own.append(twins[name][-1])
-        else:
-            own.append(name)
+        again = name and name in names[:i]
+        own.append(f"{name}#{names[: i + 1].count(name)}" if again else name)
+        if again:
+            twins.setdefault(name, []).append(own[-1])
     return own, twins
 
 
@@ -352,7 +351,7 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
     is none, the first line that is no comment is taken for the names, so that the reader's message names what is wrong
     below it.
     """
-    best: tuple[tuple[int, int], _Table] | None = None
+    tables: list[tuple[tuple[int, int], _Table]] = []
     for delimiter in _DELIMITERS:
         rows = [(number, split(line.strip(" \r\n"), delimiter), line) for number, line in lines]
         widths = [0 if line.lstrip().startswith(_COMMENTS) else _width(fields) for _, fields, line in rows]
@@ -363,11 +362,9 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
             if (table := next(filter(None, found), None)) is not None:
                 n = sum(one == width and row[0] >= table.first for one, row in zip(widths, rows, strict=True))
                 # That blanks divide a timestamp makes no column
-                score = (n, width - (delimiter is None and bool(table.clocks)))
-                if best is None or score > best[0]:
-                    best = (score, table)
-    if best is not None:
-        return best[1]
+                tables.append(((n, width - (delimiter is None and bool(table.clocks))), table))
+    if tables:
+        return max(tables, key=lambda one: one[0])[1]
     known = [(number, line) for number, line in lines if not line.lstrip().startswith(_COMMENTS)] or list(lines)
     if not known:
         return None

@@ -211,8 +211,7 @@ class Machine(FileSection):
 
     def _compensator_entries(self, kind: type[Settings]) -> dict[str, Any]:
         """Return the entries of the compensator's section that are fields of one class of settings."""
-        names = kind.parameters()
-        return {name: value for name, value in self.compensator.items() if name in names}
+        return {name: value for name, value in self.compensator.items() if name in kind.parameters()}
 
     def trajectory_limits(self) -> Limits:
         """Return the limits of the reference trajectory; MachineError if the file has no ``[limits]``."""

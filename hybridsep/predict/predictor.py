@@ -124,8 +124,7 @@ class HybridPredictor:
         rest = None if start is None else float(as_samples([start], "start")[0])
         n_init = samples_before(replace(self.settings, t_init=t_init).warm_up, self.T_s)
         residual, late = self.residual.restart(), np.zeros(self.settings.n_late)
-        physics = self.discrete.rest()
-        self.state = PredictorState(0, n_init, rest, physics, late, residual, self.state.uncertainty)
+        self.state = PredictorState(0, n_init, rest, self.discrete.rest(), late, residual, self.state.uncertainty)
         self.pending: PredictedWindow | None = None
 
     def plan_ahead(self, preview: int) -> None:

@@ -99,8 +99,7 @@ class RidgeRegression:
 
     def add(self, other: RidgeRegression) -> RidgeRegression:
         """Return the regression with all rows of another one of the same features, its penalty with them."""
-        factor = _folded(self.factor, other.factor, len(other.factor))
-        return RidgeRegression(factor, self.n_rows + other.n_rows)
+        return RidgeRegression(_folded(self.factor, other.factor, len(other.factor)), self.n_rows + other.n_rows)
 
     def discount(self, weight: float) -> RidgeRegression:
         """Return the regression with all rows weighed by ``weight``, 0 ≤ weight ≤ 1, in the sum of squares; λ, too.
