@@ -82,11 +82,8 @@ def build_fmu(
     if name not in names:
         raise FmuError(f"machine {machine.name} has no FMU {name!r}; it has {', '.join(names)}")
     model = names[name]
-    users = (
-        (samples, "samples", ("ReferenceTrajectory",)),
-        (weights, "weights", ("HybridPredictor", "SepCompensator")),
-    )
-    for given, what, models in users:
+    uses = ((samples, "samples", ("ReferenceTrajectory",)), (weights, "weights", ("HybridPredictor", "SepCompensator")))
+    for given, what, models in uses:
         if given is not None and model not in models:
             raise FmuError(f"{what} are for a {' or a '.join(models)}, {name} is a {model}")
     if embed_weights and (weights is None or flavour != "native"):

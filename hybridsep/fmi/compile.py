@@ -127,7 +127,7 @@ def compiler_for(target: str) -> Compiler:
     chosen = os.environ.get("CC", "").split()
     for command in (chosen, ["cc"], ["gcc"], ["clang"]):
         if command and shutil.which(command[0]):
-            said = subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
+            said = subprocess.run([*command, "--version"], capture_output=True, text=True).stdout
             return tuple(command), f"{' '.join(command)} {said}"
     raise FmuError("no C compiler: no ziglang and none of $CC, cc, gcc, clang; pip install ziglang")
 
@@ -143,9 +143,7 @@ def _compiled(folder: Path, library: Library, compiler: Sequence[str]) -> bytes:
     flags = [*FLAGS, "-D_GNU_SOURCE", "-g0", "-s", "-shared", "-I."]
     output = f"{kind}{TARGETS[target].suffix}"
     command = [*compiler, *flags, "all.c", "-o", output, *TARGETS[target].flags]
-    done = subprocess.run(
-        command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, errors="replace", check=False
-    )
+    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, errors="replace")
     if done.returncode != 0:
         said = f"{' '.join(command)}\n{done.stderr.strip()}"
         raise FmuError(f"{kind} cannot be compiled for {TARGETS[target].triple}: {said}")

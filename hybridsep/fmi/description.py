@@ -274,10 +274,8 @@ def documentation(
         compiling=sources,
         sources="\n".join(f"<li>{html.escape(source)}</li>" for source in named),
     )
-    return {
-        "documentation/index.html": f"{page}\n".encode(),
-        "documentation/externalDependencies.txt": dependencies.encode(),
-    }
+    files = {"index.html": f"{page}\n", "externalDependencies.txt": dependencies}
+    return {f"documentation/{file}": text.encode() for file, text in files.items()}
 
 
 def _section(template: str, **values: object) -> str:

@@ -152,9 +152,7 @@ def _modes(modes: Sequence[Mapping[str, float]]) -> list[Variable]:
 def modes_from(values: Mapping[str, Value]) -> list[dict[str, float]]:
     """Return the modes of the variables ``mode[i].*``; ParameterError, with its place, if one is out of its range."""
     n = sum(name.endswith(".f_n") for name in values)
-    return [
-        {key: check(key, values[f"mode[{i}].{key}"], label=f"mode[{i}].{key}") for key in MODE} for i in range(1, n + 1)
-    ]
+    return [{key: check(key, values[name := f"mode[{i}].{key}"], label=name) for key in MODE} for i in range(1, n + 1)]
 
 
 def _predictor_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
@@ -225,16 +223,14 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
 
 def _plant_variables(parameters: Mapping[str, Value], modes: Sequence[Mapping[str, float]]) -> list[Variable]:
     """Return the table of a FeedDrive: with ``modes`` of the stage, without of eq. (13)."""
-    velocity = Variable(
-        "v", "Real", "output", "continuous", "true velocity", unit="m/s", display_unit="mm/s", nominal=1e-2
-    )
+    v = Variable("v", "Real", "output", "continuous", "true velocity", unit="m/s", display_unit="mm/s", nominal=1e-2)
     drive: dict[str, tuple[str, ...]] = {"Drive": ("m", "c", "k", "c_nl", "k_nl")}
     stage = {"Disturbance": ("f", "kappa", "friction_on", "v_friction"), "Command": ("T_s", "dead_time", "input_hold")}
     groups = {**(stage if modes else drive), "Encoder": ("noise_std", "seed")}
     return [
         _position("x_d", "input", "commanded position, constant over a step", start=0.0),
         _position("x", "output", "true position", variability="continuous", initially_from=("x_d",)),
-        velocity,
+        v,
         _position(
             "x_meas", "output", "measured position, with encoder noise", initially_from=("x_d", "noise_std", "seed")
         ),
@@ -330,18 +326,10 @@ class FmuTable:
             return self.variables
         T_s = float(self.parameters["T_s"])
         played = SAMPLES_TRAJECTORY + (self.parameters["trajectory"] == SAMPLES_TRAJECTORY)
-        own: dict[str, dict[str, float]] = {
-            "T_s": {"minimum": T_s, "maximum": T_s},
-            "trajectory": {"maximum": played - 1},
-        }
+        own: dict[str, Any] = {"T_s": {"minimum": T_s, "maximum": T_s}, "trajectory": {"maximum": played - 1}}
         return tuple(
-            replace(
-                variable,
-                items=variable.items[:played],
-                item_meanings=variable.item_meanings[:played],
-                **own.get(variable.name, {}),  # type: ignore[arg-type]
-            )
-            for variable in self.variables
+            replace(one, items=one.items[:played], item_meanings=one.item_meanings[:played], **own.get(one.name, {}))
+            for one in self.variables
         )
 
     def named(self, causality: str) -> dict[str, Variable]:
