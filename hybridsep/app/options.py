@@ -119,12 +119,10 @@ def takes_known(command: Callable[..., None]) -> Callable[..., None]:
     Its argument ``known`` becomes the mapping of those that are given, by their names.
     """
     taken = []
-    for parameter in (*map(PARAMETERS.__getitem__, PredictorSettings.KNOWN), *DRIVE_LIMIT_ENTRIES.values()):
-        option = typer.Option(f"--{parameter.name}", help=f"{parameter.help}; none, or the usual one, if left out")
-        annotation = Annotated[parameter.kind | None, option]  # type: ignore[name-defined]
-        taken.append(
-            inspect.Parameter(parameter.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
-        )
+    for one in (*map(PARAMETERS.__getitem__, PredictorSettings.KNOWN), *DRIVE_LIMIT_ENTRIES.values()):
+        option = typer.Option(f"--{one.name}", help=f"{one.help}; none, or the usual one, if left out")
+        annotation = Annotated[one.kind | None, option]  # type: ignore[name-defined]
+        taken.append(inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation))
     return _in_the_place_of(
         "known", taken, lambda values: {name: value for name, value in values.items() if value is not None}, command
     )

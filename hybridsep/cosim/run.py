@@ -181,9 +181,7 @@ class Run:
 
     def batch_rms(self) -> dict[str, Array]:
         """Return the RMS errors of each window, m, ``(n_batches,)``, of ``x_pb``, ``x_hold`` and ``x_h``."""
-        return {
-            name: metrics.batch_rms(self.x_meas - getattr(self, name), self.Np) for name in ("x_pb", "x_hold", "x_h")
-        }
+        return {one: metrics.batch_rms(self.x_meas - getattr(self, one), self.Np) for one in ("x_pb", "x_hold", "x_h")}
 
     def save(self, path: str | Path) -> None:
         """Write the columns of the run's kind to ``path``: ``.csv`` with one row a sample, or ``.npz``.

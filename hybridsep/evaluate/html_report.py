@@ -205,7 +205,5 @@ class Report:
         """Write the HTML file."""
         template = (Path(__file__).parent / "templates" / "report.html").read_text(encoding="utf-8")
         body = "\n".join([*self._parts, *([_SCRIPT] if self._n_charts else [])])
-        page = Template(template).substitute(
-            title=html.escape(self.title), subtitle=html.escape(self.subtitle), body=body
-        )
-        write_whole(path, page)
+        title, subtitle = map(html.escape, (self.title, self.subtitle))
+        write_whole(path, Template(template).substitute(title=title, subtitle=subtitle, body=body))

@@ -49,9 +49,7 @@ def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
         return float(sum(np.nansum((error - np.nanmean(error)) ** 2) for error in errors))  # their zeros may differ
 
     bounds = [math.log(samples) for samples in _TIME_CONSTANTS]
-    fits = [
-        (minimize_scalar(misfit, bounds=bounds, args=(late,), method="bounded"), late) for late in range(_LATE_MAX + 1)
-    ]
+    fits = [(minimize_scalar(misfit, bounds=bounds, args=(n,), method="bounded"), n) for n in range(_LATE_MAX + 1)]
     best, late = min(fits, key=lambda fit: float(fit[0].fun))
     return FirstOrderLag(math.exp(best.x), late)
 

@@ -144,15 +144,11 @@ def _cause(ratios: Sequence[float], change: float, largest: float, later: Array 
     return ""
 
 
-def _not_learned(n_rejected: int, n_missing: int, n_samples: int) -> str:
-    n_implausible = n_rejected - n_missing
-    if n_missing and n_implausible:
-        return (
-            f"{n_rejected} of {n_samples} measurements were not learned: {n_missing} missing, {n_implausible} not "
-            "plausible"
-        )
-    were, why = "was" if n_rejected == 1 else "were", "missing" if n_missing else "not plausible"
-    return f"{n_rejected} of {n_samples} measurements {were} {why}, and not learned"
+def _not_learned(n: int, n_missing: int, n_samples: int) -> str:
+    if 0 < n_missing < n:
+        return f"{n} of {n_samples} measurements were not learned: {n_missing} missing, {n - n_missing} not plausible"
+    were, why = "was" if n == 1 else "were", "missing" if n_missing else "not plausible"
+    return f"{n} of {n_samples} measurements {were} {why}, and not learned"
 
 
 def counted(n: int) -> str:

@@ -329,11 +329,8 @@ class Tracking:
 
     def _rival_words(self) -> str:
         """Return in what the rival is better than the hybrid, as a sentence; empty where it is not."""
-        sizes = (
-            ("RMS", self.inverse.rms, self.hybrid.rms),
-            ("largest error", self.inverse.largest, self.hybrid.largest),
-        )
-        better = " and ".join(name for name, rival, hybrid in sizes if rival < hybrid)
+        sizes = (("RMS", "rms"), ("largest error", "largest"))
+        better = " and ".join(what for what, one in sizes if getattr(self.inverse, one) < getattr(self.hybrid, one))
         return f" That is better than the hybrid in {better}: such a filter of the command may do." if better else ""
 
 

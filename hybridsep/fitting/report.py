@@ -198,9 +198,8 @@ def _write_horizon(report: Report, judged: Judged) -> None:
     horizon = scale * judged.replay.horizon()
     ahead = 1e3 * judged.T_s * np.arange(1, judged.replay.Np + 1)
     lines = [Line(name, ahead, row, colour) for name, row, colour in zip(_NAMES, horizon, _COLOURS, strict=True)]
-    report.chart(
-        Chart("ahead [ms]", (f"RMS error [{unit}]",), lines, "How the error grows from the window's first sample on.")
-    )
+    how = "How the error grows from the window's first sample on."
+    report.chart(Chart("ahead [ms]", (f"RMS error [{unit}]",), lines, how))
 
 
 def _write_spectra(report: Report, judged: Judged) -> None:
