@@ -234,7 +234,7 @@ def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Find
     ``x_d`` and ``x``, ``(n,)``, are the liveliest samples, NaN where missing, and ``given`` how x follows x_d there.
     """
     known = np.isfinite(x)
-    evidence = given._asdict()
+    evidence, gains = given._asdict(), (given.gain, given.gain_at_one)
     filled = np.interp(np.arange(len(x)), np.flatnonzero(known), x[known])
     exchanged = following(filled, np.where(known, x_d, np.nan))
     noise = noise_std(x_d) / _travel(x_d), noise_std(filled) / _travel(x)
@@ -260,9 +260,7 @@ def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Find
             "it another axis (--x NAME)?"
         )
         yield Finding("hardly follows", words, evidence, refused=True)
-    elif given.left < _POOR and (
-        max(given.gain, given.gain_at_one) < _GAINS[0] or min(given.gain, given.gain_at_one) > _GAINS[1]
-    ):
+    elif given.left < _POOR and (max(gains) < _GAINS[0] or min(gains) > _GAINS[1]):
         gain = given.gain  # above a drive's bandwidth the other is smaller
         words = (
             f"the measured position moves {gain:.4g} times as far as the commanded one{_as_units(gain)}: state the "

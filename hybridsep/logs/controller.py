@@ -84,9 +84,8 @@ def controller_of(logs: Sequence[Log]) -> Controller | None:
     found: dict[str, ErrorSize] = {}
     delay = lead("planned_position", "x")
     if delay is not None:
-        found["behind_plan"], found["without_delay"] = (
-            ErrorSize.of(behind("planned_position", "x", n)) for n in (0, delay)
-        )
+        found["behind_plan"] = ErrorSize.of(behind("planned_position", "x", 0))
+        found["without_delay"] = ErrorSize.of(behind("planned_position", "x", delay))
     for what in there & {"following_error", "contour_deviation"}:
         found[what] = ErrorSize.of(np.concatenate([part[what] for part in parts]))
     return Controller(logs[0].T_s, delay, lead("planned_position", "loop_command"), **found)

@@ -169,11 +169,8 @@ def read_log(
     chosen = {**chosen, **signal_columns(source, chosen)}
     block, resampling = side_by_side(source, chosen, resample=resample)
     read, repeats = _without_repeats(_checked(path, block, chosen))
-    signals = {
-        what: chosen[what].unit.factor * read[what]
-        for what in SIGNALS
-        if what in chosen and not np.isnan(read[what]).all()
-    }
+    own = {what: chosen[what].unit.factor * read[what] for what in SIGNALS if what in chosen}
+    signals = {what: values for what, values in own.items() if not np.isnan(values).all()}
     x_d, x_meas = (chosen[role].unit.factor * read[role] for role in ("x_d", "x"))
     time = chosen.get("t")
     if time is None:

@@ -233,9 +233,8 @@ def _mean_interval(t: Array) -> tuple[float, float]:
 def _rounded(mean: float, tolerance: float) -> float:
     """Return the interval, s, or inverse of a rate, with the fewest digits within a relative tolerance of a mean."""
     # 0.001 s, or 1/3000 s; twelve digits always are within the tolerance
-    candidates = (
-        candidate
-        for digits in range(12)
-        for candidate in (float(f"{mean:.{digits}e}"), 1 / float(f"{1 / mean:.{digits}e}"))
-    )
-    return next((one for one in candidates if abs(one - mean) <= tolerance * mean), mean)
+    for digits in range(12):
+        for one in (float(f"{mean:.{digits}e}"), 1 / float(f"{1 / mean:.{digits}e}")):
+            if abs(one - mean) <= tolerance * mean:
+                return one
+    return mean
