@@ -98,9 +98,8 @@ class SepCompensator:
         self.lead_in = int(lead_in)
         self._state_before = min(self.compensate, SepState.PHYSICS)
         self._planning.restart(predictor.T_s)
-        self.monitor = Monitor(
-            samples_before(self.settings.measurement_timeout, self.T_s), self.settings.following_error_max
-        )
+        n_lost = samples_before(self.settings.measurement_timeout, self.T_s)
+        self.monitor = Monitor(n_lost, self.settings.following_error_max)
         # Coefficients of the remainder of the last plan; last values of δ and of x_d
         self._previous_plan = np.zeros(N_DECIDED + self._basis.n_free)
         self._last_stop = np.zeros(0 if self._stop is None else self._stop.n)

@@ -5,7 +5,6 @@ and ``x_d_ahead = r(k)``; then both step. The controller delays the trajectory, 
 samples more, and a run is recorded without the first fill. If the controller has a ``measurement_delay``, what is
 measured arrives that many samples later; a run has it as it was measured. With −1 it arrives a sample early: the drive
 steps before the controller, as under a sequential (Gauss-Seidel) master.
-Adapters: ``FmuController``, ``LibraryController``, ``_OwnController``; ``FmuDrive``, ``_LibraryDrive``.
 """
 
 import math

@@ -329,9 +329,7 @@ def fit(
             raise ParameterError(f"{log.path.name} is in {log.unit}, {logs[0].path.name} in {logs[0].unit}")
     findings = {log.path.name: checked(log) for log in logs}
     window = max(1, round(_LOOK_AHEAD / T_s)) if Np is None else Np
-    recordings = [
-        piece for log in logs for piece in split_log([(s.x_d, s.x_meas) for s in log.segments()], _SHARE, window)
-    ]
+    recordings = [one for log in logs for one in split_log([(s.x_d, s.x_meas) for s in log.segments()], _SHARE, window)]
     judging = max(len(recording.x) - recording.n_train for recording in recordings)
     if Np is not None and Np > judging:
         raise ParameterError(

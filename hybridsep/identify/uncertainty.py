@@ -70,11 +70,8 @@ def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array,
             columns, less = affine(fit.structure, responses(fit.structure, sections, u), np.zeros(len(u)))
             return columns @ fit.linear - less, columns
 
-        x, columns = position(fit.theta)
-        slopes = [
-            (position(fit.theta + step)[0] - position(fit.theta - step)[0]) / (2 * _STEP)
-            for step in _STEP * np.eye(len(fit.theta))
-        ]
+        (x, columns), theta, steps = position(fit.theta), fit.theta, _STEP * np.eye(len(fit.theta))
+        slopes = [(position(theta + step)[0] - position(theta - step)[0]) / (2 * _STEP) for step in steps]
         by_delay = -np.gradient(x)
         block = np.column_stack((*slopes, columns, by_delay, np.ones(len(x))))
         known = segment.known
@@ -120,9 +117,7 @@ def _named(fit: Fit, covariance: Array, T_s: float, unit: str) -> tuple[Estimate
     return tuple(found)
 
 
-def _differences(function: Callable[[Array], Array], point: Array) -> Array:
+def _differences(f: Callable[[Array], Array], point: Array) -> Array:
     """Return the Jacobian by central differences, ``(n_values, n_parameters)``."""
     steps = _STEP * np.maximum(np.abs(point), 1.0)
-    return np.column_stack(
-        [(function(point + step) - function(point - step)) / (2 * step.sum()) for step in np.diag(steps)]
-    )
+    return np.column_stack([(f(point + step) - f(point - step)) / (2 * step.sum()) for step in np.diag(steps)])

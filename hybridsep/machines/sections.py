@@ -329,8 +329,8 @@ class LogSection(Section):
         return {name: value for name, value in self.table.items() if name in ("t", "x_d", "x")}
 
 
-def _own(settings: type[PredictorSettings | CompensatorSettings]) -> dict[str, Parameter]:
-    return {name: one for name, one in settings.parameters().items() if name not in settings.ELSEWHERE}
+def _own(*several: type[PredictorSettings | CompensatorSettings]) -> dict[str, Parameter]:
+    return {name: one for its in several for name, one in its.parameters().items() if name not in its.ELSEWHERE}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -347,9 +347,7 @@ class FileSection(Section):
     unit: str = choice_entry("m", "rad", default="m")
     physics: Physics = section_entry(Physics)
     predictor: Mapping[str, Any] = _settings_entry(_own(PredictorSettings), lambda given: PredictorSettings(**given))
-    compensator: Mapping[str, Any] = _settings_entry(
-        {**_own(PredictorSettings), **_own(CompensatorSettings)}, lambda _given: None
-    )
+    compensator: Mapping[str, Any] = _settings_entry(_own(PredictorSettings, CompensatorSettings), lambda _given: None)
     plant: PlantSection | None = plant_entry()
     limits: LimitsSection | None = section_entry(LimitsSection, None)
     drive_limits: DriveLimitsSection | None = section_entry(DriveLimitsSection, None)

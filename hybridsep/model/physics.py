@@ -143,10 +143,7 @@ class ModalModel:
         step, _ = discrete.forced_response(discrete.rest(), np.ones(_LOOK_AHEAD_MAX // 3))
         reached = np.abs(step) >= 0.95 * abs(self.dc_gain)
         rise = int(np.argmax(reached)) if reached.any() else len(step)
-        peaks = [
-            (abs(mode.alpha) / mode.omega**2 + abs(mode.beta) / mode.omega) * max(1.0, 0.5 / mode.zeta)
-            for mode in self.modes
-        ]
+        peaks = [(abs(m.alpha) / m.omega**2 + abs(m.beta) / m.omega) * max(1.0, 0.5 / m.zeta) for m in self.modes]
         seen = min(0.05 * abs(self.dc_gain), max(peaks))
         swinging = [mode for mode, peak in zip(self.modes, peaks, strict=True) if peak >= seen and mode.zeta < 1.0]
         periods = [math.ceil(1.5 / mode.f_n / T_s) for mode in swinging]
@@ -188,10 +185,7 @@ class ModalModel:
             raise ParameterError(f"T_s is needed: dead_time = {self.dead_time} is counted in samples")
         s = 1j * as_array(omega, "omega")
         # Eq. (15)
-        G = sum(
-            (mode.alpha + mode.beta * s) / (s**2 + 2 * mode.zeta * mode.omega * s + mode.omega**2)
-            for mode in self.modes
-        )
+        G = sum((m.alpha + m.beta * s) / (s**2 + 2 * m.zeta * m.omega * s + m.omega**2) for m in self.modes)
         return np.asarray(G * np.exp(-s * self.dead_time * (T_s or 0.0)), dtype=np.complex128)
 
 

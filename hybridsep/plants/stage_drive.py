@@ -151,12 +151,10 @@ class StageDrive:
         """Return the command disturbed by friction, if it is one of the commanded velocity."""
         return r - self.f * math.tanh(v_d / self.v_friction) if self.friction_on == "command" else r
 
-    def _integrated(
-        self, z: list[float], acting: float, v_d: float, time: float, v: float
-    ) -> tuple[list[float], float]:
-        """Return ``z`` after ``time``, s, from the command that acts, and a velocity of the last internal step."""
-        n = internal_steps(time, self._rate)
-        dt, f, rate = time / n, self._derivative, v_d if self._foh else 0.0  # m/s, with which the command goes on
+    def _integrated(self, z: list[float], acting: float, v_d: float, h: float, v: float) -> tuple[list[float], float]:
+        """Return ``z`` after ``h``, s, from the command that acts, and a velocity of the last internal step."""
+        n = internal_steps(h, self._rate)
+        dt, f, rate = h / n, self._derivative, v_d if self._foh else 0.0  # m/s, with which the command goes on
         half, sixth = dt / 2, dt / 6
         first = self._disturbed(acting, v_d)
         for i in range(n):

@@ -234,11 +234,9 @@ class HybridPredictor:
                 forecast, residual = replace(forecast, window=window), residual.begin_in_motion(window, forecast.scales)
         residual, accepted = residual.learn(forecast, measured - start, fold=learn, ahead=ahead)
         uncertainty = state.uncertainty.learn(error, e_pb, accepted, self.Np) if learn else state.uncertainty
-        x_d = forecast.window.x_d
+        x_d, on_the_way = forecast.window.x_d, forecast.window.x_d[m : m + late].copy()
         _, physics = self.discrete.forced_response(physics, x_d[:m])
-        self.state = PredictorState(
-            state.k + m, state.n_init, start, physics, x_d[m : m + late].copy(), residual, uncertainty
-        )
+        self.state = PredictorState(state.k + m, state.n_init, start, physics, on_the_way, residual, uncertainty)
         self.pending = None
 
     def operator(self, n: int | None = None) -> WindowOperator:
