@@ -146,9 +146,7 @@ def test_what_is_quick_and_what_prints_json_says_nothing(clock: Clock, capsys: p
     assert capsys.readouterr() == ("", "")
 
 
-def test_the_demo_and_the_readme_say_how_long_it_takes(
-    hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_demo_and_readme_say_how_long_it_takes(hybridsep: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 

@@ -54,9 +54,7 @@ def built(fitted: Fit, log: Path) -> dict[str, Path]:
 
 
 @pytest.mark.slow
-def test_the_figures_are_of_a_causal_replay_with_the_machine_file(
-    fitted: Fit, built: dict[str, Path], log: Path
-) -> None:
+def test_figures_are_of_a_causal_replay_with_the_machine_file(fitted: Fit, built: dict[str, Path], log: Path) -> None:
     machine = load_machine(built["machine file"])
     assert machine == fitted.machine
     found = read_log(log)

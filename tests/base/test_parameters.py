@@ -91,9 +91,7 @@ def test_all_problems_at_once() -> None:
 @pytest.mark.parametrize(("Np", "preview", "spacing", "n_problems"), [
     (50, 61, 2, 0), (50, 60, 2, 1), (50, 200, 3, 1), (50, 200, 100, 2), (1, 8, 1, 0), (75, 98, 5, 0), (75, 97, 5, 1),
 ])  # fmt: skip
-def test_a_preview_that_does_not_fit_the_window_is_refused(
-    Np: int, preview: int, spacing: int, n_problems: int
-) -> None:
+def test_a_preview_that_does_not_fit_a_window_is_refused(Np: int, preview: int, spacing: int, n_problems: int) -> None:
     settings = CompensatorSettings(preview=preview, spacing=spacing, horizon=preview)
     predictor = HybridPredictor(
         ModalModel.spring_mass_damper(1.0, 15.7, 24674.0), PredictorSettings(averaging=False, Np=Np, p=1, q=0)
@@ -172,9 +170,8 @@ def test_settings_and_an_fmus_values_are_the_same() -> None:
     assert CompensatorSettings.from_fmi(values) == compensator
     assert PredictorSettings.from_table(asdict(predictor)) == predictor
     assert CompensatorSettings.from_table(asdict(compensator)) == compensator
-    with pytest.raises(
-        ParameterError, match=r"^v_max must be 1e-09 … 10000 m/s, got 0; compensate must be 0 … 2, got 3$"
-    ):
+    said = r"^v_max must be 1e-09 … 10000 m/s, got 0; compensate must be 0 … 2, got 3$"
+    with pytest.raises(ParameterError, match=said):
         CompensatorSettings.from_fmi({**values, "compensate": 3, "v_max": 0})
 
 

@@ -66,9 +66,7 @@ def test_nothing_but_the_fmi_functions_has_external_linkage(
 
 
 @pytest.mark.slow
-def test_three_fmus_in_one_program_compute_what_their_libraries_do(
-    folders: Folders, headers: Path, tmp_path: Path
-) -> None:
+def test_three_fmus_in_one_program_compute_as_their_libraries(folders: Folders, headers: Path, tmp_path: Path) -> None:
     """Bit for bit, though with another optimisation, and the tables of their headers instead of files."""
     objects = [compiled(folders(model), headers, tmp_path) for model in MODELS]
     for model, path in zip(MODELS, objects, strict=True):

@@ -71,9 +71,8 @@ def test_every_fmu_starts_where_the_trajectory_does(tmp_path: Path, compensate: 
     machine, shift, command = load_machine("spring_mass_damper"), 0.11, staircase()[:400]
     sent, runs = ("x_dm" if compensate else "x_d"), []
     for place in (0.0, shift):
-        path = build_system(
-            machine, tmp_path / f"{place}.ssp", command + place, compensate=compensate, targets=("host",)
-        )
+        where, x_d = tmp_path / f"{place}.ssp", command + place
+        path = build_system(machine, where, x_d, compensate=compensate, targets=("host",))
         fmus = {}
         for name, data in content(path).items():
             if name.endswith(".fmu"):

@@ -17,11 +17,8 @@ from quick_fits import without_larger_structures, without_other_settings
 from benchmarks.pictures import RECORD, judged_figures
 from hybridsep import staircase
 
-PAGES = [
-    ROOT / "README.md",
-    *sorted((ROOT / "docs" / "start").glob("*.md")),
-    *sorted((ROOT / "docs" / "howto").glob("*.md")),
-]
+FOLDERS = [ROOT / "docs" / name for name in ("start", "howto")]
+PAGES = [ROOT / "README.md", *(page for folder in FOLDERS for page in sorted(folder.glob("*.md")))]
 RUN = re.compile(r"```(sh|python)\n(.*?)```", re.DOTALL)
 ELSEWHERE = ("python3 -m venv", "sphinx-build ", "hybridsep fit my_axis.csv --Np 100 --v_max ")
 """Begin of lines that others run: CI, ``test_demo``, ``test_site``, ``test_fit_compensation``."""

@@ -96,9 +96,7 @@ def test_what_fmi_2_has_besides_is_refused_by_name(fmu2: Library) -> None:
 
 
 @pytest.mark.parametrize(("kind", "n_callbacks"), [("ModelExchange", 0), ("ScheduledExecution", 3)])
-def test_an_instance_of_another_kind_is_refused_by_name(
-    loaded: dict[int, Library], kind: str, n_callbacks: int
-) -> None:
+def test_instances_of_another_kind_are_refused_by_name(loaded: dict[int, Library], kind: str, n_callbacks: int) -> None:
     fmu = loaded[3]
     create: Any = getattr(fmu, f"Instantiate{kind}")
     create.argtypes, create.restype = None, c_void_p

@@ -168,9 +168,7 @@ def _reaches_a_share(share: float) -> Log:
 def _robot_joint(times: float, dead_time: int) -> Log:
     """A joint of 3 Hz, driven so many times as fast and in motion from the first sample on."""
     t, numbers = 4e-3 * np.arange(3000), np.random.default_rng(75)
-    x_d = sum(
-        a * np.sin(2 * np.pi * 3.0 * times * f * t + phase) for a, f, phase in ((0.3, 1.0, 0.4), (0.1, 1.13, 2.0))
-    )
+    x_d = sum(a * np.sin(2 * np.pi * 3.0 * times * f * t + p) for a, f, p in ((0.3, 1.0, 0.4), (0.1, 1.13, 2.0)))
     x = _modes(np.asarray(x_d), 4e-3, [Mode(3.0, 0.15, (6 * np.pi) ** 2)], dead_time)
     return replace(log_of(np.asarray(x_d), x + 1e-4 * numbers.normal(size=len(t)), 4e-3), unit="rad", unit_stated=True)
 

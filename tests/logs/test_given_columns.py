@@ -224,9 +224,7 @@ def test_what_is_no_log(given: Any) -> None:
     ],
 )
 def test_names_of_robots_and_controllers(names: tuple[str, ...], axis: str | None) -> None:
-    data = {
-        name.format(j): (j + 1) * values for j in range(4) for name, values in zip(names, [X_D, X, X, X], strict=False)
-    }
+    data = {name.format(j): (j + 1) * x for j in range(4) for name, x in zip(names, [X_D, X, X, X], strict=False)}
     log = read_log(data, T_s=1e-3, axis=axis)
     np.testing.assert_array_equal((log.x_d, log.x_meas), (4 * X_D, 4 * X))
     assert log.columns == (names[0].format(axis), names[1].format(axis))

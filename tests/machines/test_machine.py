@@ -293,9 +293,8 @@ def test_units_stand_beside_the_entries() -> None:
 def test_units_of_a_rotary_axis_are_angles() -> None:
     limits = {"velocity": 3.0, "acceleration": 30.0, "jerk": 2e3, "change_max": 0.1}
     physics = {"spring_mass_damper": {"m": 2.0, "c": 30.0, "k": 2e4}}
-    machine = machine_from_table(
-        {"name": "a", "unit": "rad", "title": "Table", "physics": physics, "drive_limits": limits}
-    )
+    table = {"name": "a", "unit": "rad", "title": "Table", "physics": physics, "drive_limits": limits}
+    machine = machine_from_table(table)
     text = "".join(machine_text(machine).split())
     assert "velocity=3.0#rad/sacceleration=30.0#rad/s2jerk=2000.0#rad/s3change_max=0.1#rad" in text
 

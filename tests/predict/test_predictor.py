@@ -63,9 +63,7 @@ def test_figures_of_the_paper_and_of_a_warm_start() -> None:
     ("Np", "p", "q", "t_init", "dead_time"),
     [(1, 1, 0, 0.0, 0), (7, 7, 0, 0.010, 0), (7, 1, 6, 0.0, 3), (12, 12, 11, 0.0305, 1), (300, 9, 2, 0.1, 0)],
 )
-def test_equals_the_oracle_with_other_parameters(
-    Np: int, p: int, q: int, t_init: float, dead_time: int, hold: str
-) -> None:
+def test_is_the_oracle_with_other_parameters(Np: int, p: int, q: int, t_init: float, dead_time: int, hold: str) -> None:
     modes = [(25.0, 0.05, 20000.0, 15.7), (15.0, 2.0, 1600.0, 3.0)]
     model = ModalModel([Mode(*numbers) for numbers in modes], dead_time)
     x_d, x = small_signals(655, start=0.07)

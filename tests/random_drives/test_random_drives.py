@@ -70,9 +70,7 @@ def test_the_hybrid_follows_better_than_physics(tmp_path: Path) -> None:
     recipe = replace(drawn, x_d=drawn.x_d[:400], noise=drawn.noise[:400])
     machine, x_d = machine_of_drive(recipe), trajectory(recipe)
     fmu = build_here(machine, "SepCompensator", tmp_path)
-    physics, hybrid = (
-        closed_loop(fmu, machine, recipe, recipe.axis, compensate) for compensate in ("physics", "hybrid")
-    )
+    physics, hybrid = (closed_loop(fmu, machine, recipe, recipe.axis, how) for how in ("physics", "hybrid"))
     assert rms(x_d - hybrid.x) < 0.7 * rms(x_d - physics.x)
 
 

@@ -98,9 +98,7 @@ def test_outputs_before_the_initialization_has_ended(new_stream: StreamMaker) ->
         (1e308, "must be within ±1000 m, got 1e+308"),
     ],
 )
-def test_no_output_follows_from_a_start_value_that_is_no_position(
-    new_stream: StreamMaker, start: float, reason: str
-) -> None:
+def test_no_output_follows_from_a_start_that_is_no_position(new_stream: StreamMaker, start: float, reason: str) -> None:
     command = "x_d" if "FeedDrive" in new_stream.model else "x_d_ahead"
     with pytest.raises(RefusedStreamError, match=re.escape(f"the start value of {command} {reason}")):
         new_stream().outputs_before({command: start})

@@ -99,9 +99,7 @@ THIRD = 1 / 3000  # s
     ids=["whole nanoseconds", "single precision", "sum of steps"],
 )
 @on_adapters((PREDICTOR, COMPENSATOR))
-def test_figures_with_an_importers_times_are_those_of_exact_steps(
-    new_stream: StreamMaker, times: Array, warned: int
-) -> None:
+def test_figures_with_an_importers_times_are_of_exact_steps(new_stream: StreamMaker, times: Array, warned: int) -> None:
     """Every sample arrives once: the same outputs to the last bit; rounding of single precision is said once."""
     runs = []
     for exact in (True, False):

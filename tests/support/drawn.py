@@ -35,11 +35,7 @@ def cut_off(figure: Figure) -> list[str]:
         if id(text) not in ticks and text.get_visible() and text.get_text().strip():
             boxes.append((text.get_text(), text.get_window_extent()))
     width, height = figure.bbox.size
-    return [
-        name
-        for name, box in boxes
-        if box is not None and (box.x0 < 0 or box.y0 < 0 or box.x1 > width or box.y1 > height)
-    ]
+    return [name for name, b in boxes if b is not None and (b.x0 < 0 or b.y0 < 0 or b.x1 > width or b.y1 > height)]
 
 
 def hiding_legends(figure: Figure) -> int:

@@ -96,9 +96,7 @@ def twincat_csv(
     lines += [f"Starttime of export{mark}{start}{mark}Montag, 2. Mai 2022{mark}15:56:24.376"]
     lines += [f"Endtime of export{mark}{start + 10**7}{mark}Montag, 2. Mai 2022{mark}15:56:25.375", ""]
     lines += ["", row("Name", {name: name for name in channels})]
-    lines += [
-        row("SampleTime[ms]", {name: number(1e3 * T_s).removesuffix(",0") for name, (T_s, _) in channels.items()})
-    ]
+    lines += [row("SampleTime[ms]", {one: number(1e3 * T_s).removesuffix(",0") for one, (T_s, _) in channels.items()})]
     lines += [
         row("SymbolName", {name: f"MAIN.{name}" for name in channels}),
         row("Unit", dict.fromkeys(channels, unit)),
