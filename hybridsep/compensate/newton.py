@@ -28,7 +28,7 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array
 from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, SolvedExpert
-from ..predict.averaging.features import N_FRICTION, N_LASTING, N_STOPS, StaticFeatures, StaticState
+from ..predict.averaging.features import N_FRICTION, N_LASTING, N_SPANS, N_STOPS, StaticFeatures, StaticState
 from ..predict.averaging.model import AveragedForecast, AveragedModel
 from ..predict.window import ResidualWindow
 from .qp import Bounds, Tolerance, solve_change
@@ -171,7 +171,7 @@ class PlanModel:
             shrinkage = weight * left[n_late:, None]
             if expert.like(self._model).target == COMMAND_RESIDUAL:
                 # As late as the command's expert takes them
-                acted = np.pad(changes, ((self._model.command.dead_time, 0), (0, 0)))[: len(changes)]
+                acted = np.pad(changes, ((self._static.command.dead_time, 0), (0, 0)))[: len(changes)]
                 increments = np.diff(acted, axis=0, prepend=0.0)
                 drive = lfilter(one.solution.weights[1 : one.n_static], [1.0], increments, axis=0)
                 total += shrinkage * _recur(one, drive) + weight * (acted - passed)
@@ -184,8 +184,10 @@ class PlanModel:
         discrete = self._discrete
         velocity = np.diff(changes, axis=0, prepend=0.0) / discrete.T_s
         moved = np.diff(passed, axis=0, prepend=0.0) / discrete.T_s
-        weights, first = solved.solution.weights[: solved.n_static], 2 + self._static.n_differences
-        linear, own, differences = np.split(weights[1:], [first - 1, first - 1 + self._static.n_disturbances])
+        static, weights = self._static, solved.solution.weights[1 : solved.n_static]
+        linear, spans, own, differences = np.split(
+            weights, np.cumsum([1 + static.n_differences, N_SPANS, static.n_disturbances])
+        )
         disturbance = slopes.change(own, changes, velocity, passed, moved)
         disturbance += np.diff(slopes.change(differences, changes, velocity, passed, moved), axis=0, prepend=0.0)
         drive, _ = discrete.forced_response(discrete.rest(changes.shape[1]), disturbance)
@@ -193,6 +195,9 @@ class PlanModel:
         for weight in linear:
             drive = drive + weight * difference
             difference = np.diff(difference, axis=0, prepend=0.0)
+        commands = np.pad(changes, ((static.command.n_before, 0), (0, 0)))
+        for weight, change in zip(spans, static.command.changes(commands, len(changes)), strict=True):
+            drive = drive + weight * change
         return _recur(solved, drive)
 
 

@@ -1,6 +1,6 @@
 """Weights file ``resources/weights.bin`` of an FMU that starts warm: the factors of a trained predictor.
 
-Layout, little-endian: ``HSEPWG15``; the numbers of settings, of modes and of what has been learned besides the factors,
+Layout, little-endian: ``HSEPWG16``; the numbers of settings, of modes and of what has been learned besides the factors,
 as u64; each setting that shapes the features and the factors (with others the weights mean something else), its name in
 24 bytes and its value as float64; as float64 the numbers of a residual model with averaging, in the order of
 :class:`~hybridsep.predict.averaging.model.Learned`, and of :class:`~hybridsep.predict.uncertainty.Uncertainty`; for
@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # as this module is packed, and machines are not
     from ..machines.machine import Machine
 
 WEIGHTS_FILE = "weights.bin"
-_MAGIC = b"HSEPWG15"
+_MAGIC = b"HSEPWG16"
 _HEAD = struct.Struct("<8s3Q")
 _SETTING = struct.Struct("<24sd")
 _CHECKSUM = struct.Struct("<Q")

@@ -1,5 +1,7 @@
 """Features without lags against the disturbances' formulas, filtered over the whole signal at once."""
 
+from itertools import pairwise
+
 import numpy as np
 import oracle
 import pytest
@@ -78,11 +80,17 @@ def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int,
     assert first == N
     found = np.concatenate(rows)
     differences, column = min(q, 3), 1
-    assert found.shape == (N, static.n) == (N, 2 + differences + 2 * count)
+    assert found.shape == (N, static.n) == (N, static.n_linear + 2 * count)
     np.testing.assert_array_equal(found[:, 0], 1.0)
     padded = np.concatenate((np.zeros(3), x_pb))  # at rest before
     for order in range(differences + 1):
         np.testing.assert_allclose(found[:, column], np.diff(padded, order)[3 - order :], rtol=0, atol=1e-15)
+        column += 1
+    ahead = 40 - static.command.dead_time
+    acted = np.concatenate((np.zeros(40), x_d))  # at rest before
+    for begin, end in pairwise((0, 3, 9, 27)):
+        change = acted[ahead - begin :][:N] - acted[ahead - end :][:N]
+        np.testing.assert_array_equal(found[:, column], change)
         column += 1
     filtered, differenced = formula(x_d, x_pb, x, hold, dead_time, period)
     size = np.abs(filtered).max(axis=0)

@@ -15,6 +15,7 @@ are a constant and the increments ``x_d(k−d−j) − x_d(k−d−j−1)``, ``j
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -62,6 +63,12 @@ class CommandFeatures:
         increments = np.diff(np.concatenate((before, x_d))[: self.p + 1 + len(x_d)])
         return np.column_stack((np.ones(len(x_d)), lags(increments, self.p + 1)))
 
+    def changes(self, commands: Array, n: int) -> list[Array]:
+        """Return the changes over each span that ends ``d`` samples before each of the last ``n`` commands, rows."""
+        last = len(commands) - self.dead_time
+        ends = [commands[last - n - late : last - late] for late in (0, *(SPAN**i for i in range(1, N_SPANS + 1)))]
+        return [now - before for now, before in pairwise(ends)]
+
     def late(self, before: Array, x_d: Array) -> Array:
         """Return the commands ``d`` samples ago over a window, ``(n,)``, m; parameters as for :meth:`rows`."""
         return np.concatenate((before, x_d))[self.p + 1 : self.p + 1 + len(x_d)]
@@ -74,6 +81,9 @@ class CommandFeatures:
 Disturbance: TypeAlias = Callable[[Array, Array], ArrayLike]
 """Disturbance of the user's own, ``d(x, v)``, in any unit: a number for each position ``x``, m, and commanded velocity
 ``v``, m/s, ``(n,)`` each. It knows nothing of other samples."""
+
+N_SPANS, SPAN = 3, 3
+"""Spans of samples over which changes of the command are features, and the ratio from one's end to the next one's."""
 
 N_FRICTION, N_STOPS, _N_PERIODIC = 6, 3, 2
 """Disturbances by friction, by stop operators, and what repeats with the position."""
@@ -96,7 +106,7 @@ class StaticState:
 
     filters: Array  # (n_state, n_disturbances): state of ``G_pb`` for each disturbance
     filtered: Array  # (n_disturbances,): last filtered disturbances
-    x_d: float  # m: last command
+    x_d: Array  # (d + p_A + 1,), m: last commands, oldest first, of which the command's expert has ``p_A`` lags
     x_pb: Array  # (4,), m: last physics-based predictions, oldest first
     stops: Array  # (N_STOPS,), m: of the stop operators
 
@@ -124,9 +134,19 @@ class StaticFeatures:
         return N_LASTING + (_N_PERIODIC if self.period > 0.0 else 0) + len(self.own)
 
     @property
+    def n_linear(self) -> int:
+        """Number of features before the disturbances: 1, ``x_pb``, its differences, changes of the command."""
+        return 2 + self.n_differences + N_SPANS
+
+    @property
     def n(self) -> int:
         """Number of features."""
-        return 2 + self.n_differences + 2 * self.n_disturbances
+        return self.n_linear + 2 * self.n_disturbances
+
+    @property
+    def command(self) -> CommandFeatures:
+        """Features of the command."""
+        return CommandFeatures.of(self.discrete.dead_time)
 
     @property
     def shares(self) -> Array:
@@ -137,8 +157,8 @@ class StaticFeatures:
 
     def rest(self) -> StaticState:
         """Return the state at rest."""
-        n = self.n_disturbances
-        return StaticState(self.discrete.rest(n), np.zeros(n), 0.0, np.zeros(_DIFFERENCES + 1), np.zeros(N_STOPS))
+        n, x_d = self.n_disturbances, np.zeros(self.command.n_before)
+        return StaticState(self.discrete.rest(n), np.zeros(n), x_d, np.zeros(_DIFFERENCES + 1), np.zeros(N_STOPS))
 
     def peak_velocity(self, commands: Array, start: float) -> float:
         """Return the largest magnitude of the velocity of commands ``(n,)``, m, m/s; 0 below the numbers' resolution.
@@ -160,7 +180,7 @@ class StaticFeatures:
 
     def stops(self, state: StaticState, x_d: Array, velocity_scale: float) -> Array:
         """Return the stop operators over a window, ``(n, N_STOPS)``, m."""
-        steps, found = np.diff(x_d, prepend=state.x_d).tolist(), np.empty((len(x_d), N_STOPS))
+        steps, found = np.diff(x_d, prepend=state.x_d[-1]).tolist(), np.empty((len(x_d), N_STOPS))
         for i, distance in enumerate(self.distances(velocity_scale).tolist()):
             u, of_operator = float(state.stops[i]), []
             for step in steps:
@@ -175,7 +195,7 @@ class StaticFeatures:
 
     def velocity(self, state: StaticState, x_d: Array) -> Array:
         """Return the commanded velocity over a window, ``(n,)``, m/s."""
-        return np.asarray(np.diff(x_d, prepend=state.x_d) / self.discrete.T_s)
+        return np.asarray(np.diff(x_d, prepend=state.x_d[-1]) / self.discrete.T_s)
 
     def damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
         """Return the velocity of the damping over a window, ``(n,)``, m/s."""
@@ -190,7 +210,7 @@ class StaticFeatures:
 
         The sharpest friction is the direction now, the shortest stop operator that of the last motion, rests or not.
         """
-        return np.asarray(np.clip(-rows[:, 2 + self.n_differences] * state.filtered[N_FRICTION], 0.0, 1.0))
+        return np.asarray(np.clip(-rows[:, self.n_linear] * state.filtered[N_FRICTION], 0.0, 1.0))
 
     def angle(self, x: Array | float) -> Array:
         """Return the angle within the period at a position, rad."""
@@ -217,15 +237,16 @@ class StaticFeatures:
     ) -> tuple[Array, StaticState]:
         """Return the features of a window, ``(n, self.n)``, and the state after it.
 
-        Columns: 1; ``x_pb`` and its differences; the filtered disturbances; their first differences.
+        Columns: 1; ``x_pb`` and its differences; changes of the command; the filtered disturbances; their first
+        differences.
 
         ``x``, (n,), m: position that the stiffness acts at, and whose velocity is damped with ``n_known``;
         ``velocity_scale``: velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
         SignalError if a disturbance of the user's own does not return a finite number for each sample.
         """
         x_d, x_pb, start, _ = window
-        first, v_d, v = 2 + self.n_differences, self.velocity(state, x_d), self.damped_velocity(state, x_pb, x)
-        past = np.concatenate((state.x_pb, x_pb))
+        first, v_d, v = self.n_linear, self.velocity(state, x_d), self.damped_velocity(state, x_pb, x)
+        past, commands = np.concatenate((state.x_pb, x_pb)), np.concatenate((state.x_d, x_d))
         disturbances = np.empty((len(x_d), self.n_disturbances))
         disturbances[:, :N_FRICTION] = np.tanh(v_d[:, None] / self.spread(velocity_scale))
         stops, stiffness = self.stops(state, x_d, velocity_scale), N_FRICTION + N_STOPS
@@ -244,7 +265,8 @@ class StaticFeatures:
         rows[:, 0] = 1.0
         for i in range(self.n_differences + 1):
             rows[:, 1 + i] = np.diff(past, i)[_DIFFERENCES + 1 - i :]
+        rows[:, first - N_SPANS : first] = np.transpose(self.command.changes(commands, len(x_d)))
         rows[:, first : first + self.n_disturbances] = filtered
         rows[:, first + self.n_disturbances :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
         before = past[-_DIFFERENCES - 1 :].copy()
-        return rows, StaticState(filters, filtered[-1].copy(), float(x_d[-1]), before, stops[-1].copy())
+        return rows, StaticState(filters, filtered[-1].copy(), commands[len(x_d) :], before, stops[-1].copy())

@@ -59,7 +59,6 @@ class RunState:
     """What a run has been before the next window; positions relative to the start."""
 
     static: StaticState
-    commands: Array  # (d + p_A + 1,), m: last commands, oldest first, for the ``p_A`` lags of the command's expert
     # pair of (p,) and (p_A,), m: last residuals of the physics model, and of the command; newest first
     past: tuple[Array, Array]
     gate: InnovationGate
@@ -69,10 +68,9 @@ class RunState:
     level: float | None = None
 
     @classmethod
-    def init(cls, p: int, static: StaticFeatures, command: CommandFeatures, memory: Memory) -> RunState:
+    def init(cls, p: int, static: StaticFeatures, memory: Memory) -> RunState:
         """Return the beginning of a run, at rest."""
-        past = np.zeros(p), np.zeros(command.p)
-        return cls(static.rest(), np.zeros(command.n_before), past, InnovationGate(), 0, memory)
+        return cls(static.rest(), (np.zeros(p), np.zeros(static.command.p)), InnovationGate(), 0, memory)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +129,6 @@ class AveragedModel:
     # ``p`` and ``q`` are the largest lags, ``lam`` the least variance of the noise
     settings: PredictorSettings = field(metadata=FIXED)
     static: StaticFeatures = field(metadata=FIXED)
-    command: CommandFeatures = field(metadata=FIXED)
     learned: Learned
     # pair of WarmStartRows: rows of the residuals of the physics model, and of the command
     evidence: tuple[WarmStartRows, WarmStartRows]
@@ -148,14 +145,16 @@ class AveragedModel:
 
         ``discrete``: ``G_pb``; ``own``: the user's own disturbances.
         """
-        static, command = (
-            StaticFeatures(discrete, settings.q, settings.period, own),
-            CommandFeatures.of(discrete.dead_time),
-        )
-        evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * command.p + 2)
+        static = StaticFeatures(discrete, settings.q, settings.period, own)
+        evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * static.command.p + 2)
         learned, noise, leader = Learned.init(static.n), (0.0,) * len(REGRESSIONS), ARX_RESIDUAL.place
-        run = RunState.init(settings.p, static, command, Memory.init(settings.recall, settings.Np))
-        return cls(settings, static, command, learned, evidence, noise, leader, run)
+        run = RunState.init(settings.p, static, Memory.init(settings.recall, settings.Np))
+        return cls(settings, static, learned, evidence, noise, leader, run)
+
+    @property
+    def command(self) -> CommandFeatures:
+        """Features of the expert of the command."""
+        return self.static.command
 
     @property
     def leading(self) -> Regression:
@@ -215,7 +214,7 @@ class AveragedModel:
         if evidence[MODEL_RESIDUAL].earlier.n_rows > 0.0:
             stacks, errors = [one.copy(leading, FRESH_START) for one in stacks], learned.errors_of(leading)
         learned = replace(learned.with_errors({FRESH_START: errors}), stacks=tuple(stacks))
-        run = RunState.init(self.settings.p, self.static, self.command, self.run.memory.restart())
+        run = RunState.init(self.settings.p, self.static, self.run.memory.restart())
         state = replace(self, learned=learned, evidence=evidence, leader=leading.place, run=run)
         return state.with_noise(learned)
 
@@ -242,7 +241,7 @@ class AveragedModel:
         """
         static, learned, settings = self.static, self.learned, self.settings
         before = learned.velocity_scale
-        peak = static.peak_velocity(np.append(self.run.static.x_d, window.x_d), window.start)
+        peak = static.peak_velocity(np.append(self.run.static.x_d[-1:], window.x_d), window.start)
         n_windows = self.evidence[MODEL_RESIDUAL].earlier.n_rows / settings.Np
         outgrown = peak > max(CONSTANTS.velocity_jump * max(n_windows, 1.0) * before, LEAST_VELOCITY)
         step = max(learned.largest_step, peak * settings.T_s)
@@ -318,8 +317,8 @@ class AveragedModel:
         late = commands[-1 - command.dead_time :: -1][: command.p]
         past = self.run.past[MODEL_RESIDUAL], positions[: -command.p - 1 : -1] - late
         stops = np.sign(x_d[1] - x_d[0]) * self.static.distances(scales.velocity)
-        static = replace(static, x_d=float(commands[-1]), x_pb=positions[-len(static.x_pb) :], stops=stops)
-        return replace(self, run=replace(self.run, static=static, commands=commands, past=past))
+        static = replace(static, x_d=commands, x_pb=positions[-len(static.x_pb) :], stops=stops)
+        return replace(self, run=replace(self.run, static=static, past=past))
 
     def learn(
         self, forecast: AveragedForecast, x: Array, *, fold: bool = True, ahead: Array | None = None
@@ -339,22 +338,21 @@ class AveragedModel:
         largest, T_s = learned.scales[MODEL_RESIDUAL].largest, self.settings.T_s
         accepted, gate = gated(run.gate, measured, largest, learned.fastest, T_s)
         e = _bridged(forecast.e_h[:m], measured, accepted)
-        e_0 = e + window.x_pb - self.command.late(run.commands, window.x_d)
+        e_0 = e + window.x_pb - self.command.late(run.static.x_d, window.x_d)
         rows, static = self.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
         if fold:
             if run.level is None and accepted.any():
                 level = float(np.mean(e[accepted]))
-                rests = np.ptp(np.append(window.x_d, run.static.x_d)) <= _LITTLE * abs(level)
+                rests = np.ptp(np.append(window.x_d, run.static.x_d[-1])) <= _LITTLE * abs(level)
                 run = replace(run, level=level if rests else 0.0)
                 state = replace(state, run=run)
-            of_command = self.command.rows(run.commands, window.x_d)
+            of_command = self.command.rows(run.static.x_d, window.x_d)
             state = _folded(state, forecast, (rows, of_command), (e, e_0), accepted)
             state = _judged(state, forecast, (e, e_0), accepted, ahead) if accepted.any() else state
         past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
         n_rejected = run.n_rejected + m - int(accepted.sum())
-        commands = np.concatenate((run.commands, window.x_d))[m:]
         memory = forecast.memory.remember(e)
-        run = RunState(static, commands, (past[0], past[1]), gate, n_rejected, memory, run.level)
+        run = RunState(static, (past[0], past[1]), gate, n_rejected, memory, run.level)
         return replace(state, run=run), accepted
 
 

@@ -119,6 +119,20 @@ static void linearised_pass(
     }
 }
 
+/* Add the response of the changes of the command over spans. */
+static void linearised_span(hsep_linearised *self, const hsep_real weights[], hsep_int dead_time, hsep_real to[])
+{
+    const hsep_real *commands = hsep_at(self, self->commands);
+    for (hsep_int begin = 0, end = HSEP_FEATURES_SPAN, i = 0; i < HSEP_FEATURES_N_SPANS; i++) {
+        for (hsep_int u = dead_time + begin; u < self->preview; u++) {
+            const hsep_int after = u - dead_time;
+            to[u] += weights[i] * (commands[1 + after - begin] - commands[after >= end ? 1 + after - end : 0]);
+        }
+        begin = end;
+        end *= HSEP_FEATURES_SPAN;
+    }
+}
+
 /* Share of an expert in the stack, sample after sample: what shrinking and bounds leave of its recursion. */
 static void linearised_shrink(const hsep_expert *expert, hsep_real weight, hsep_int n, hsep_real shrink[])
 {
@@ -219,9 +233,11 @@ HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model,
         const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
         const hsep_real weight = linearised_weight(model, i, HSEP_COMMAND_RESIDUAL);
         if (linearised_weight(model, i, HSEP_MODEL_RESIDUAL) > 0.0) {
-            linearised_pass(
-                hsep_expert_weights(expert) + 1, first - 1, change->passed, self->preview,
-                linearised_response(self, i));
+            const hsep_int n_passed = first - 1 - HSEP_FEATURES_N_SPANS;
+            const hsep_real *weights = hsep_expert_weights(expert) + 1;
+            hsep_real *response = linearised_response(self, i);
+            linearised_pass(weights, n_passed, change->passed, self->preview, response);
+            linearised_span(self, weights + n_passed, dead_time, response);
         } else if (weight > 0.0) {
             linearised_of_increments(self, expert, change->n, dead_time, linearised_response(self, i));
             for (hsep_int u = 0; u < self->preview; u++) {

@@ -9,7 +9,7 @@
 
 #include "hsep_predictor.h"
 
-#define HSEP_LEARNED_MAGIC "HSEPWG15"
+#define HSEP_LEARNED_MAGIC "HSEPWG16"
 
 typedef struct {
     char magic[8];

@@ -60,6 +60,8 @@
 #define HSEP_EXPERTS_LEAST HSEP_TINY(1e-150)
 
 /* hybridsep/predict/averaging/features.py */
+#define HSEP_FEATURES_N_SPANS 3
+#define HSEP_FEATURES_SPAN 3
 #define HSEP_FEATURES_N_FRICTION 6
 #define HSEP_FEATURES_N_STOPS 3
 #define HSEP_FEATURES_N_PERIODIC 2

@@ -25,15 +25,25 @@ static int averaged_outgrown(hsep_averaged *self, const hsep_real x_d[], const h
     return outgrown;
 }
 
+/* Fill the rows of the samples that come next, at x_pb. */
+static void averaged_rows(hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[])
+{
+    hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
+    hsep_command *command = hsep_averaged_command(self);
+    const hsep_real *late = hsep_command_late(command, self->n), scale = self->forecast_scale;
+    hsep_real *rows = hsep_at(self, self->rows);
+    hsep_command_take(command, x_d, self->n);
+    hsep_disturbances_command(disturbances, x_d, late, x_pb, self->n, scale, rows);
+    hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, 0, self->n, rows);
+}
+
 /* Take the scales of the features from the samples that come next; return as averaged_outgrown. */
 static int averaged_scale(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_int n_path)
 {
-    hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
     const int outgrown = averaged_outgrown(self, x_d, path, n_path);
     hsep_real *rows = hsep_at(self, self->rows), *largest = hsep_at(self, self->forecast_largest);
-    hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
-    hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, 0, self->n, rows);
+    averaged_rows(self, x_d, x_pb);
     for (hsep_int i = 0; i < self->n_static; i++) {
         largest[i] = outgrown ? 0.0 : hsep_at(self, self->largest)[i];
     }
@@ -95,13 +105,12 @@ static void averaged_solve(hsep_averaged *self, int outgrown)
 
 /* Begin the prediction of commands x_d by the experts that know something. past: (p,) m, the last residuals of the
  * physics model. */
-static void averaged_begin(hsep_averaged *self, const hsep_real x_d[], const hsep_real past[])
+static void averaged_begin(hsep_averaged *self, const hsep_real past[])
 {
     const hsep_residual_scale *of_physics = &self->learned.scales[HSEP_MODEL_RESIDUAL];
     const hsep_residual_scale *of_command = &self->learned.scales[HSEP_COMMAND_RESIDUAL];
     const hsep_real *past_of_command = hsep_at(self, self->e_0) + self->Np, growth = self->growth;
     const hsep_real most = growth * of_command->largest, square = growth * growth * of_command->largest_square;
-    hsep_command_take(hsep_averaged_command(self), x_d, self->n);
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         hsep_expert *expert = hsep_averaged_expert(self, i);
         if (self->predicted[i] && hsep_averaged_kind_of(self, i) == HSEP_COMMAND_RESIDUAL) {
@@ -258,17 +267,14 @@ HSEP_API void hsep_averaged_forecast(
     averaged_solve(self, outgrown);
     memset(hsep_at(self, self->stacked), 0, (size_t)(HSEP_N_EXPERTS * self->n) * sizeof(hsep_real));
     averaged_recall(self, e[self->n]);
-    averaged_begin(self, x_d, e + self->n);
+    averaged_begin(self, e + self->n);
     hsep_averaged_go_on(self, x_pb, e, 0, last, 1); /* the scales left the rows at x_pb */
 }
 
 HSEP_API void hsep_averaged_predict(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last, hsep_int apart)
 {
-    hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
-    hsep_real *rows = hsep_at(self, self->rows);
-    hsep_disturbances_command(disturbances, x_d, x_pb, self->n, self->forecast_scale, rows);
-    hsep_disturbances_motion(disturbances, x_pb, x_pb, self->n, 0, self->n, rows);
-    averaged_begin(self, x_d, e + self->n);
+    averaged_rows(self, x_d, x_pb);
+    averaged_begin(self, e + self->n);
     hsep_averaged_go_on(self, x_pb, e, 0, last, apart);
 }

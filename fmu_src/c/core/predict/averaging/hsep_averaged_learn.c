@@ -10,8 +10,11 @@ HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real
     hsep_real *past = hsep_at(self, self->e_0) + Np;
     hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
     hsep_disturbances_begin_in_motion(disturbances, x_d, x_pb, Np, self->forecast_scale);
-    hsep_disturbances_command(disturbances, x_d, x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
-    hsep_command_begin_in_motion(hsep_averaged_command(self), x_d[Np - 1], x_d[Np - 2]);
+    hsep_command *command = hsep_averaged_command(self);
+    hsep_command_begin_in_motion(command, x_d[Np - 1], x_d[Np - 2]);
+    hsep_command_take(command, x_d, Np);
+    hsep_disturbances_command(
+        disturbances, x_d, hsep_command_late(command, Np), x_pb, Np, self->forecast_scale, hsep_at(self, self->rows));
     for (hsep_int i = 0; i < HSEP_AVERAGING_LAGS_OF_COMMAND; i++) {
         past[i] = (x_pb[Np - 1] - step_pb * (hsep_real)(i + 1)) - (x_d[Np - 1] - step * (hsep_real)(dead_time + i + 1));
     }
@@ -46,11 +49,12 @@ static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], co
         hsep_at(self, self->largest), hsep_at(self, self->forecast_largest),
         (size_t)self->n_static * sizeof(hsep_real));
     hsep_gate_begin(&self->reach, learned->scales[HSEP_MODEL_RESIDUAL].largest, learned->fastest);
-    if (self->n > self->Np) { /* what was tried last went beyond the window */
-        hsep_real *rows = hsep_at(self, self->rows);
-        hsep_disturbances_command(disturbances, x_d, x_pb, self->Np, learned->velocity_scale, rows);
-    }
     hsep_command_take(command, x_d, self->Np);
+    if (self->n > self->Np) { /* what was tried last went beyond the window */
+        const hsep_real *late = hsep_command_late(command, self->Np);
+        hsep_real *rows = hsep_at(self, self->rows);
+        hsep_disturbances_command(disturbances, x_d, late, x_pb, self->Np, learned->velocity_scale, rows);
+    }
     hsep_command_fill(command, self->Np, 0, self->Np);
     self->n_accepted = 0.0;
 }

@@ -16,7 +16,7 @@ HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep
     self->count = count;
     self->period = parameters->averaging.period;
     self->n = hsep_disturbances_n(parameters);
-    self->n_differences = self->n - 2 - 2 * count;
+    self->n_linear = self->n - 2 * count;
     self->of_motion = parameters->planned != 0;
     self->T_s = parameters->settings.T_s;
     self->filters = hsep_take_block(&end, 2.0 * (hsep_real)count * filter);
@@ -76,7 +76,7 @@ static void disturbances_filter_samples(
         filters[i] = disturbances_filter(self, self->count + first + i);
     }
     hsep_physics_abreast(filters, count, u, x, n);
-    hsep_real *entry = rows + 2 + self->n_differences + first, *filtered = self->after.filtered + first;
+    hsep_real *entry = rows + self->n_linear + first, *filtered = self->after.filtered + first;
     for (hsep_int k = 0; k < n; k++, entry += self->n) {
         for (hsep_int i = 0; i < count; i++) {
             const hsep_real now = x[HSEP_PHYSICS_ABREAST * k + i];
@@ -98,17 +98,26 @@ static void disturbances_rewind(hsep_disturbances *self, hsep_int first, hsep_in
     }
 }
 
-/* Put 1, x_pb(k) and its differences into a row. x_pb: the last four, newest first. */
-static void disturbances_differences(const hsep_disturbances *self, const hsep_real x_pb[], hsep_real row[])
+/* Put 1, x_pb(k) and its differences, and changes of the command, into a row. x_pb: the last four; late: the command
+ * that acts, and those before it; newest first. */
+static void disturbances_linear(
+    const hsep_disturbances *self, const hsep_real x_pb[], const hsep_real late[], hsep_real row[])
 {
+    const hsep_int n_differences = self->n_linear - HSEP_FEATURES_N_SPANS - 2;
     hsep_real d[HSEP_FEATURES_DIFFERENCES + 1];
     memcpy(d, x_pb, sizeof d);
     row[0] = 1.0;
-    for (hsep_int i = 0; i <= self->n_differences; i++) {
+    for (hsep_int i = 0; i <= n_differences; i++) {
         row[1 + i] = d[0];
         for (hsep_int j = 0; j + i < HSEP_FEATURES_DIFFERENCES; j++) {
             d[j] -= d[j + 1];
         }
+    }
+    row += self->n_linear - HSEP_FEATURES_N_SPANS;
+    for (hsep_int begin = 0, end = HSEP_FEATURES_SPAN, i = 0; i < HSEP_FEATURES_N_SPANS; i++) {
+        row[i] = late[begin] - late[end];
+        begin = end;
+        end *= HSEP_FEATURES_SPAN;
     }
 }
 
@@ -158,8 +167,8 @@ static void disturbances_of_command(
 }
 
 HSEP_API void hsep_disturbances_command(
-    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n, hsep_real velocity_scale,
-    hsep_real rows[])
+    hsep_disturbances *self, const hsep_real x_d[], const hsep_real late[], const hsep_real x_pb[], hsep_int n,
+    hsep_real velocity_scale, hsep_real rows[])
 {
     hsep_disturbed *now = &self->after;
     hsep_real steps[DISTURBANCES_TOGETHER];
@@ -177,7 +186,7 @@ HSEP_API void hsep_disturbances_command(
                 now->x_pb[i] = now->x_pb[i - 1];
             }
             now->x_pb[0] = x_pb[j];
-            disturbances_differences(self, now->x_pb, rows + k * self->n);
+            disturbances_linear(self, now->x_pb, late + j, rows + k * self->n);
         }
         disturbances_of_command(self, steps, count, velocity_scale, rows);
         rows += count * self->n;
@@ -197,7 +206,7 @@ HSEP_API hsep_real hsep_disturbances_damped_velocity(
 
 HSEP_API hsep_real hsep_disturbances_turned(const hsep_disturbances *self, const hsep_real row[])
 {
-    const hsep_real turned = -row[2 + self->n_differences] * self->before.filtered[HSEP_FEATURES_N_FRICTION];
+    const hsep_real turned = -row[self->n_linear] * self->before.filtered[HSEP_FEATURES_N_FRICTION];
     return hsep_fmin(hsep_fmax(turned, 0.0), 1.0);
 }
 

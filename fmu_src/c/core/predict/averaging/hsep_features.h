@@ -1,8 +1,8 @@
 /* Features of the experts: disturbances filtered by the physics model, and increments of the command; as
  * predict/averaging/features.py, which says why.
  *
- * Static features are without lags. A row is [1 | x_pb and its differences | filtered disturbances | their first
- * differences]. The expert without a physics model, eq. (4) with G_pb = 1, has increments of the command. Positions are
+ * Static features are without lags. A row is [1 | x_pb and its differences | changes of the command over spans | filtered
+ * disturbances | their first differences]. The expert without a physics model, eq. (4) with G_pb = 1, has increments of the command. Positions are
  * relative to the start. Of n samples, sample k is at place n - 1 - k: newest first, as their past is behind them.
  * Blocks as hsep_layout.h has them.
  */
@@ -18,7 +18,8 @@
 #define HSEP_DISTURBANCES_DAMPING (HSEP_DISTURBANCES_STIFFNESS + 1)
 #define HSEP_DISTURBANCES_MAX (HSEP_FEATURES_N_LASTING + HSEP_FEATURES_N_PERIODIC)
 #define HSEP_DISTURBANCES_PAST (HSEP_FEATURES_DIFFERENCES + 1) /* predictions that differences need */
-#define HSEP_DISTURBANCES_MOST (2 + HSEP_FEATURES_DIFFERENCES + 2 * HSEP_DISTURBANCES_MAX) /* features at most */
+#define HSEP_DISTURBANCES_MOST \
+    (2 + HSEP_FEATURES_DIFFERENCES + HSEP_FEATURES_N_SPANS + 2 * HSEP_DISTURBANCES_MAX) /* features at most */
 
 /* What was before a sample. */
 typedef struct {
@@ -29,18 +30,18 @@ typedef struct {
 } hsep_disturbed;
 
 typedef struct {
-    hsep_int n_differences; /* of x_pb, at most 3 */
-    hsep_int count;         /* disturbances, at most HSEP_DISTURBANCES_MAX */
-    hsep_int n;             /* features */
-    hsep_real period;       /* m, of a disturbance that repeats with the position; 0: none */
-    hsep_real origin;       /* m, the start: what repeats does not know of it */
-    hsep_int of_motion;     /* whether the position's own velocity is damped; else the velocity of x_pb, which
+    hsep_int n_linear;     /* features before the disturbances' */
+    hsep_int count;        /* disturbances, at most HSEP_DISTURBANCES_MAX */
+    hsep_int n;            /* features */
+    hsep_real period;      /* m, of a disturbance that repeats with the position; 0: none */
+    hsep_real origin;      /* m, the start: what repeats does not know of it */
+    hsep_int of_motion;    /* whether the position's own velocity is damped; else the velocity of x_pb, which
                               * behind a compensator turns with every change of the command, far from the motion */
-    hsep_real T_s;          /* s */
-    hsep_disturbed before;  /* the window that comes next */
-    hsep_disturbed after;   /* the samples that were tried last */
-    hsep_int filter_words;  /* words of a filter */
-    hsep_int filters;       /* offset of the hsep_physics of each disturbance before the window, and behind them after
+    hsep_real T_s;         /* s */
+    hsep_disturbed before; /* the window that comes next */
+    hsep_disturbed after;  /* the samples that were tried last */
+    hsep_int filter_words; /* words of a filter */
+    hsep_int filters;      /* offset of the hsep_physics of each disturbance before the window, and behind them after
                               * the samples that were tried last */
 } hsep_disturbances;
 
@@ -55,7 +56,7 @@ static inline hsep_int hsep_disturbances_count(const hsep_predictor_parameters *
 static inline hsep_int hsep_disturbances_n(const hsep_predictor_parameters *parameters)
 {
     const hsep_int q = parameters->settings.q, most = HSEP_FEATURES_DIFFERENCES;
-    return 2 + (q < most ? q : most) + 2 * hsep_disturbances_count(parameters);
+    return 2 + (q < most ? q : most) + HSEP_FEATURES_N_SPANS + 2 * hsep_disturbances_count(parameters);
 }
 
 HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep_predictor_parameters *parameters);
@@ -75,11 +76,12 @@ HSEP_API hsep_real hsep_disturbances_resolved(const hsep_disturbances *self, hse
 HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_int n);
 
 /* Fill the rows of the n samples that come next, (n, self->n), sample after sample, but for what
- * hsep_disturbances_motion fills; may be tried again with others. velocity_scale: m/s, 0 before any motion. Cost:
+ * hsep_disturbances_motion fills; may be tried again with others. late: of the commands x_d, with those before them, as
+ * hsep_command_late; velocity_scale: m/s, 0 before any motion. Cost:
  * HSEP_FEATURES_N_FRICTION tanh and 9 n_modes HSEP_DISTURBANCES_OF_COMMAND multiply-adds a sample. */
 HSEP_API void hsep_disturbances_command(
-    hsep_disturbances *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_int n, hsep_real velocity_scale,
-    hsep_real rows[]);
+    hsep_disturbances *self, const hsep_real x_d[], const hsep_real late[], const hsep_real x_pb[], hsep_int n,
+    hsep_real velocity_scale, hsep_real rows[]);
 
 /* Fill stiffness, damping and what repeats of samples first ... last - 1 of these in the rows, which act at the
  * position x, (n,), m; first is 0, or where the last call ended; may be tried again. */
