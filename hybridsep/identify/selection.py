@@ -78,10 +78,10 @@ _FITTED_BETTER = 0.7
 """Ratio of the fitted errors at which a larger structure is taken though the held-out errors are alike: most of the
 held-out error may be what no structure explains, such as a first reversal."""
 
-_CANCELLING_WORTH = 0.6
-"""Ratio of the errors, geometric mean of fitted and held-out ones, at which a model with a slow part that its zeros all
-but cancel is taken: a slow part that fits friction and cables leaves 0.64 to 0.85, one that is in the drive's loops
-less."""
+_CANCELLING_WORTH, _HELD_OUT_WORTH = 0.6, 0.75
+"""Ratios of the errors at which a model with a slow part that its zeros all but cancel is taken, geometric mean of
+fitted and held-out ones, and of the latter alone: a slow part that fits friction and cables leaves 0.64 to 0.85, one
+that is in the drive's loops less; friction that creeps looks so while it is fitted, and leaves 0.8 to 1 later."""
 
 _LIGHT, _DAMPED = 0.25, 0.5
 """Damping ratio below which a second order is hardly damped; that of a loop whose motion does not tell it."""
@@ -170,7 +170,8 @@ def choose(candidates: Sequence[Candidate]) -> Candidate:
         return chosen
     other = _chosen_of(plain)
     ratios = chosen.fit.rms / other.fit.rms, chosen.rms_held_out / other.rms_held_out
-    return chosen if max(np.sqrt(np.prod(ratios)), ratios[1]) < _CANCELLING_WORTH else other
+    is_worth = np.sqrt(np.prod(ratios)) < _CANCELLING_WORTH and ratios[1] < _HELD_OUT_WORTH
+    return chosen if is_worth else other
 
 
 def without_long_delay(chosen: Candidate, segments: Sequence[Segment], T_s: float) -> Candidate:

@@ -94,7 +94,7 @@ def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, built: di
     advice = fitted.advice
     page = built["report"].read_text(encoding="utf-8")
     others = "ARX40 (refitted), the best of the others"
-    assert advice == f"Use the hybrid: its error is 0.61 × the error of {others}, judged by 30 windows."
+    assert advice == f"Use the hybrid: its error is 0.59 × the error of {others}, judged by 30 windows."
     assert advice in page
     assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.replay.rms())
     assert "HybridPredictor_axis.fmu" in page

@@ -41,7 +41,7 @@ def test_what_has_changed_is_relearned_as_cold(factor: float) -> None:
     x = physics(x_d) + factor * friction(x_d) + NOISE * np.random.default_rng(8).normal(size=len(x_d))
     warm = learned(x_d, friction(x_d))
     found, cold = run(warm, x_d, x), run(averaged(), x_d, x)
-    assert rms((x - found)[2000:]) <= 1.02 * rms((x - cold)[2000:])
+    assert rms((x - found)[2000:]) <= 1.03 * rms((x - cold)[2000:])
     model = averaged_model(warm)
     assert not model.doubts
     assert model.learned.stack.weights[FRESH_START.place] == 0.0

@@ -149,7 +149,7 @@ def test_the_stage_is_compensated_as_by_the_library(new_stream: StreamMaker) -> 
 def test_the_staircase_is_compensated_with_averaging_as_by_the_library(new_stream: StreamMaker) -> None:
     loop = assert_agreement(new_stream, 1600, {}, 1e-11, start=0.1)
     assert set(loop.column(COMPENSATOR, "sep_state")) == {1.0, 2.0}
-    assert loop.column(COMPENSATOR, "rms_e")[-1] < 1e-5
+    assert loop.column(COMPENSATOR, "rms_e")[-1] < 1.1e-5
     assert (loop.column(COMPENSATOR, "x_h_std") > 0.0).all()
 
 
