@@ -2,7 +2,7 @@
 
 ``min ‖w (x_d − x_h(x_d + δ))‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where the weights ``w`` of the errors
 fall to the end of a plan (``splines.py``), and where ``x_h`` is not affine in ``δ``:
-friction that follows the command changes its sign with the command's velocity. One or two Gauss-Newton steps begin at
+friction that follows the command changes its sign with the command's velocity. One to three Gauss-Newton steps begin at
 the remainder of the last plan: each solves the quadratic programme of the model linearised where the last one ended,
 friction over as large a change of velocity as the last step made, and goes to its minimum, or less far if only that
 lowers the cost; the next window goes on from there. The first samples of a plan follow the last plan, and the plan is
@@ -261,9 +261,10 @@ FIRST_REACH, _LEAST_REACH, _REACH = 0.1, 0.03, 0.5
 first step of a run and at least; and relative to what the last step has changed of the velocity, or would have (RMS). A
 slope over less is blind to a sign that changes nearby, and no way down; one over more sees signs that stay."""
 
-TWICE = 15
-"""Samples that a plan has from which on it makes two Newton steps: in windows of 50, a quarter of the preview, one
-leaves fifteen times the error of two, as of three, on the stage's X axis, warm; in windows of 20 as much as two."""
+TWICE, THRICE = 15, 5
+"""Samples that a plan has from which on it makes two Newton steps, and windows in a plan below which it makes three: a
+sample is planned in so many. In windows of 50 of 200 one step leaves fifteen times the error of two on the stage's X
+axis, warm, and on its Y axis two leave three times the error of three; in windows of 20 one leaves as much as two."""
 
 PHYSICS_STEPS = 3  # of the solver, for the physics model's plan that Newton steps are compared with
 

@@ -24,7 +24,7 @@ from ..predict.averaging.experts import EXPERTS
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
-from .newton import FIRST_REACH, PHYSICS_STEPS, TOLERANCE, TWICE, AveragedPlanner, PlanModel, is_better
+from .newton import FIRST_REACH, PHYSICS_STEPS, THRICE, TOLERANCE, TWICE, AveragedPlanner, PlanModel, is_better
 from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve, solve_change
 from .splines import N_DECIDED, SplineBasis, solved_splines
 
@@ -295,6 +295,8 @@ class AveragedPlanning(Planning):
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         super().__init__(basis, bounds, settings, Np)
         self.weight = basis.weight
+        few = self.n_pinned * self.spacing < TWICE
+        self.n_steps = 1 if few else 2 if THRICE * Np <= self.horizon else 3
         # A plan that has faded as it had no stop may exceed limits where wide splines cannot leave it
         n = basis.n_free - self.n_pinned
         free = solved_splines(n, Np // self.spacing if self.horizon == settings.preview else n)
@@ -344,7 +346,7 @@ class AveragedPlanning(Planning):
             of_physics, is_away, reach = planner.point(physics), False, None
             if follows:
                 hybrid, reach = last, self.reach
-                for _ in range(2 if self.n_pinned * self.spacing >= TWICE else 1):
+                for _ in range(self.n_steps):
                     before = replace(preview, previous_plan=hybrid.coefficients)
                     bounds = self.limits(before, may_turn=True, change=change)
                     hybrid, reach = planner.step(hybrid, bounds, self.basis.filtered(g), reach)

@@ -22,7 +22,8 @@ HSEP_API hsep_real hsep_averaged_planner_lay_out(
     self->Np = planner->Np;
     self->n = n;
     self->m = m;
-    self->n_steps = n_pinned * planner->spacing >= HSEP_NEWTON_TWICE ? 2 : 1;
+    const int few = n_pinned * planner->spacing < HSEP_NEWTON_TWICE;
+    self->n_steps = few ? 1 : HSEP_NEWTON_THRICE * planner->Np <= planner->preview ? 2 : 3;
     self->rest = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
     self->of_physics = hsep_take(&end, coefficients);
