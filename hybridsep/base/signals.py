@@ -26,7 +26,7 @@ squares of smaller values cannot overflow."""
 
 _SI = ("", "m", "meter", "metre", "rad", "radian", "dimensionless")  # units of a quantity that is taken as it is
 
-_GAP = 1.5  # usual steps of an index from which on samples are missing in it
+_GAP = 1.75  # usual steps of an index from which on samples are missing in it; 1.25 ms may be rounded to 2 ms
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,16 +125,19 @@ def as_array(values: Any, name: str, factor: _Factor = None, *, T_s: float | Non
         raise SignalError(f"{name} must be in m or rad, got {brief(given.unit)}; convert it, or read_log does")
     labels = index_values(given.index)
     if len(labels) > 1:
-        usual = np.abs(np.median(np.diff(labels)))
-        steps = np.diff(labels) / usual
-        if not (even := (steps > 0.0) & (steps < _GAP)).all():
+        expected, n = T_s if labels.dtype.kind in "mM" else None, len(labels) - 1
+        steps = np.diff(labels) / (np.timedelta64(1, "s") if labels.dtype.kind in "mM" else 1)
+        usual = abs(float(np.median(steps)))
+        if expected is not None and abs(usual - expected) < 0.5 * expected:  # that of rounded times is another
+            usual = expected
+        if not (even := (steps > 0.0) & (steps < _GAP * usual)).all():
             i = int(np.argmin(even))
             raise SignalError(
                 f"the index of {name} must be even, it goes from {labels[i]} to {labels[i + 1]} at sample {i + 1}; "
                 "read_log puts a few rows back, and begins another segment after a longer gap"
             )
-        if T_s is not None and labels.dtype.kind in "mM":
-            check_interval(f"the index of {name}", float(usual / np.timedelta64(1, "s")), "what takes it", T_s)
+        if expected is not None and n > 1 and abs(steps.sum() - n * expected) > max(0.01 * n, 1.0) * expected:
+            check_interval(f"the index of {name}", float(steps.mean()), "the predictor", expected)
     return np.asarray((factor(given.unit) if factor else 1.0) * given.values, dtype=np.float64, order="C")
 
 

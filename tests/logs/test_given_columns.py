@@ -171,8 +171,11 @@ def test_labels_of_samples() -> None:
     with pytest.raises(SignalError, match="the index of r must be even, it goes from 999 to 1100 at sample 1000; read"):
         hybridsep.cosimulate(predictor, machine.new_plant(), kept)
     slower = Labelled(1e-3 * X_D, Labelled(np.datetime64("2026-03-05") + 2 * np.arange(N).astype("m8[ms]")))
-    with pytest.raises(ParameterError, match=r"the index of x_d is sampled every 0\.002 s"):
+    with pytest.raises(ParameterError, match=r"the index of x_d is sampled every 0\.002 s, but the predictor has T_s"):
         predictor.predict(slower)
+    for T_s, n in ((1.25e-3, 100), (2.5e-3, 100), (2.5e-3, 2)):
+        rounded = Labelled(X_D[:n], Labelled(np.datetime64("2026-03-05") + (1e3 * T_s * np.arange(n)).astype("m8[ms]")))
+        np.testing.assert_array_equal(as_samples(rounded, "x_d", T_s=T_s), X_D[:n])
     levels = Labelled(np.arange(N))
     levels.nlevels = 2  # type: ignore[attr-defined]
     refused(r"the index runs backwards; sort_index\(\)", Frame(np.arange(len(X))[::-1], x_d=X_D, x=X), T_s=1e-3)
