@@ -25,7 +25,9 @@ from .verdict import Verdict, judge
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_FASTER = 100.0  # usual motion relative to the fastest that was learned from which the unit is another: mm are 1000
+_FASTER, _FASTEST = 100.0, {"m": 50.0, "rad": 1000.0}
+"""Usual motion, relative to the fastest that was learned, and speed, m/s or rad/s, from which on, both, the unit is
+another: mm are 1000 times as fast. Arrays count as metres, but may be rad: 50 rad/s are many for an axis."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -110,7 +112,7 @@ def backtest(
     ParameterError
         If the samples are not as far apart as the predictor's.
     SignalError
-        If the samples are empty, of different lengths, not finite, or move a hundred times as fast as all that was
+        If the samples are empty, of different lengths, not finite, or faster than an axis and than all that was
         learned, as in another unit; the predictor is unchanged then. If the prediction diverges.
     """
     check_kind(HybridPredictor, predictor=predictor)
@@ -128,7 +130,9 @@ def backtest(
     measured = as_measured(x_meas, "x_meas", len(command), T_s=T_s)
     learned: Any = predictor.residual.learned  # of the paper's model no speed
     fastest, steps = getattr(learned, "largest_step", 0.0), np.abs(np.diff(command))
-    if len(moving := steps[steps > 0.0]) and np.median(moving) > _FASTER * fastest > 0.0:
+    steps = np.minimum(steps[1:], steps[:-1])  # a jump of the command is no motion
+    least = max(_FASTER * fastest, _FASTEST[unit] * T_s)
+    if len(moving := steps[steps > 0.0]) and np.median(moving) > least and fastest > 0.0:
         raise SignalError(
             f"x_d must be in m or rad: it moves {np.median(moving):.3g} a sample, {fastest:.3g} at most were learned; "
             "read_log({'x_d': x_d, 'x': x}, T_s=…, unit='mm') makes a log of arrays in another unit"

@@ -132,6 +132,8 @@ def test_what_cannot_be_is_refused(axis: Fit, tmp_path: Path) -> None:
     for call, message in calls:
         with pytest.raises((ParameterError, SignalError), match=message):
             call()
+    rapid = 1e-3 * np.r_[20.0 * np.arange(100), 0.0]  # 20 m/s, then a jump; 4 m are not too many
+    assert hybridsep.backtest(axis.predictor(), rapid, rapid).n_batches == 3
     at_0.sample(0.5, 0.0)
     assert at_0._ahead[0] == 0.5
     assert "rms_h_urad" in hybridsep.backtest(axis.predictor(), replace(log, unit="rad")).summary()
