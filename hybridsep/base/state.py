@@ -42,12 +42,12 @@ def pack(
     return blob + _CRC.pack(zlib.crc32(blob))
 
 
-def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], dict[str, bytes]]:
+def unpack(kind: str, blob: bytes | bytearray) -> tuple[dict[str, Any], dict[str, Array], dict[str, bytes]]:
     """Return ``(meta, arrays, parts)`` of a blob made by :func:`pack`.
 
     StateError if the blob is not one, is truncated or damaged, or is of another kind or version.
     """
-    check_kind(bytes, blob=blob)
+    check_kind(bytes | bytearray, blob=blob)
     if len(blob) < _PREFIX.size + _CRC.size or blob[:4] != _MAGIC:
         raise StateError(f"a saved state of kind {kind!r} was expected, got {len(blob)} bytes of another format")
     _, version, length = _PREFIX.unpack_from(blob)
@@ -67,7 +67,7 @@ def unpack(kind: str, blob: bytes) -> tuple[dict[str, Any], dict[str, Array], di
         arrays[name] = np.frombuffer(blob, "<f8", count, offset).reshape(shape).astype(np.float64)
         offset += 8 * count
     for name, count in header["parts"]:
-        parts[name] = blob[offset : offset + count]
+        parts[name] = bytes(blob[offset : offset + count])
         offset += count
     return header["meta"], arrays, parts
 

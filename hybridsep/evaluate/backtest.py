@@ -7,6 +7,7 @@ this replay) and the hybrid ``x_h`` of eq. (4). During the warm-up all three pub
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -87,7 +88,7 @@ def backtest(
     x_d: ArrayLike | Log | Mapping[str, ArrayLike] | Table,
     x_meas: ArrayLike = (),
     *,
-    starts: Sequence[int] = (0,),
+    starts: Sequence[float] = (0,),
     progress: Callable[[float], object] = lambda _done: None,
 ) -> Backtest:
     """Replay a log.
@@ -102,7 +103,7 @@ def backtest(
         Commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it is missing. Or a
         :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments, or a table that is read as one. Arrays
         in another unit are a log of :func:`~hybridsep.logs.log.read_log`.
-    starts : sequence of int
+    starts : sequence of whole numbers
         First samples of the segments, which gaps separate: another run begins with each, and what was learned is kept.
     progress : callable, optional
         Called with the fraction done after each window.
@@ -146,7 +147,7 @@ def backtest(
     if ends[0] != 0.0 or not (np.diff(ends) >= 1.0).all() or (ends % 1.0).any():
         raise SignalError(f"starts must be whole numbers from 0 on that rise and are below {n}, got {brief(starts)}")
     n_rejected, parts = 0, []
-    for begin, end in zip(starts, (*starts[1:], n), strict=True):
+    for begin, end in pairwise(map(int, ends)):
         if begin:
             predictor.restart()
         late = (command[begin] if predictor.start is None else predictor.start) + predictor.state.late

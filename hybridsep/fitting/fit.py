@@ -2,7 +2,7 @@
 
 import errno
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -257,7 +257,7 @@ def fit(
     columns: Mapping[str, str] | None = None,
     axis: str | None = None,
     Np: int | None = None,
-    p: Sequence[int] = (),
+    p: Iterable[int] = (),
     look_ahead: float | None = None,
     cascade: Mapping[str, float] | None = None,
     name: str = "axis",
@@ -281,7 +281,7 @@ def fit(
         in rad; only its ``predict`` takes and gives the unit.
     Np : int, optional
         Samples in a window of the predictor, its look-ahead; 0.1 s of them if left out.
-    p : sequence of int
+    p : iterable of int
         Numbers of lags to choose from; some shares of ``Np`` if left out, none longer than a compensator's window.
     look_ahead : float, optional
         That the controller has for a compensator, s; what the model needs if left out
@@ -309,7 +309,8 @@ def fit(
         If a log is too short to be split.
     """
     checked_name(name)
-    check_kind(Sequence | None, p=p)
+    check_kind(Iterable | None, p=p)
+    p = () if p is None else tuple(p)
     check_kind(Mapping | None, cascade=cascade)
     check_kind(Callable, progress=progress)
     if unknown := set(cascade or ()) - Cascade.parameters().keys():

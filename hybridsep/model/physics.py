@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import reduce
 from itertools import combinations
@@ -69,15 +69,15 @@ class ModalModel:
     modes: tuple[Mode, ...]
     dead_time: int = 0
 
-    def __init__(self, modes: Sequence[Mode], dead_time: int = 0) -> None:
-        check_kind(Sequence, modes=modes)
-        if not modes:
+    def __init__(self, modes: Iterable[Mode], dead_time: int = 0) -> None:
+        check_kind(Iterable, modes=modes)
+        if not (modes := tuple(modes)):
             raise ParameterError("a modal model needs at least one mode, got none")
         for one in modes:
             check_kind(Mode, mode=one)
         if len(modes) > MODES_MAX:
             raise ParameterError(f"a modal model has at most {MODES_MAX} modes, got {len(modes)}")
-        object.__setattr__(self, "modes", tuple(modes))
+        object.__setattr__(self, "modes", modes)
         object.__setattr__(self, "dead_time", check("dead_time", dead_time))
 
     @classmethod
@@ -183,7 +183,7 @@ class ModalModel:
         """
         if self.dead_time and T_s is None:
             raise ParameterError(f"T_s is needed: dead_time = {self.dead_time} is counted in samples")
-        s = 1j * as_array(omega, "omega")
+        s = 1j * as_array(getattr(omega, "to_numpy", lambda: omega)(), "omega")  # an index may be of any frequencies
         # Eq. (15)
         G = sum((m.alpha + m.beta * s) / (s**2 + 2 * m.zeta * m.omega * s + m.omega**2) for m in self.modes)
         return np.asarray(G * np.exp(-s * self.dead_time * (T_s or 0.0)), dtype=np.complex128)

@@ -5,7 +5,7 @@
 recursion from the last ``p`` measured residuals, affine in the command.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias, cast
@@ -62,7 +62,7 @@ class HybridPredictor:
     start : float, optional
         Initial position, m, at rest; the first command if left out. Positions are relative to it internally, because
         ridge regression is not invariant to an offset.
-    disturbances : sequence of Disturbance, optional
+    disturbances : iterable of Disturbance, optional
         With averaging: more candidate disturbances, functions ``d(x, v)`` of positions, m, and commanded velocities,
         m/s, ``(n,)`` each, in any unit; what they are worth is learned. A compensator follows their slopes, taken over
         the motion of a sample. They are not part of a saved state, or of an FMU.
@@ -87,11 +87,11 @@ class HybridPredictor:
         settings: PredictorSettings | None = None,
         *,
         start: float | None = None,
-        disturbances: Sequence[Disturbance] = (),
+        disturbances: Iterable[Disturbance] = (),
     ) -> None:
         check_kind(ModalModel, model=model)
         check_kind(PredictorSettings | None, settings=settings)
-        check_kind(Sequence, disturbances=disturbances)
+        check_kind(Iterable, disturbances=disturbances)
         self.settings = settings = PredictorSettings() if settings is None else settings
         self.Np, self.T_s = settings.Np, settings.T_s
         self.model, self.disturbances, self.planned = model, tuple(disturbances), 0
@@ -340,7 +340,7 @@ class HybridPredictor:
         return pack(_KIND, meta, arrays)
 
     @classmethod
-    def from_bytes(cls, blob: bytes, disturbances: Sequence[Disturbance] = ()) -> "HybridPredictor":
+    def from_bytes(cls, blob: bytes | bytearray, disturbances: Sequence[Disturbance] = ()) -> "HybridPredictor":
         """Return the predictor of :meth:`to_bytes`, given the ``disturbances`` that it was learned with.
 
         StateError if the blob is foreign, truncated or of another version, or the number of disturbances differs.

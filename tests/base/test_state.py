@@ -77,7 +77,7 @@ def test_a_flipped_byte(position: int, flip: int) -> None:
     damaged = bytearray(PREDICTOR)
     damaged[position] ^= flip
     with pytest.raises(StateError):
-        HybridPredictor.from_bytes(bytes(damaged))
+        HybridPredictor.from_bytes(damaged)
 
 
 @given(st.binary(max_size=200))

@@ -108,7 +108,7 @@ def test_what_cannot_be_is_refused(axis: Fit, tmp_path: Path) -> None:
         axis.build(tmp_path / "file")
     pieces = hybridsep.read_log({"t": 1e-3 * np.arange(N) + np.arange(N) // 30, "x_d": X_D, "x": X})
     with pytest.raises(ParameterError, match=r"has 30 samples; give a smaller Np, or 80 samples or more without"):
-        hybridsep.fit(pieces, Np=NP)
+        hybridsep.fit(pieces, Np=NP, p=iter([8]))
     with pytest.raises(LogError, match=r"a log is a file, a mapping of columns or a table, got ndarray; x beside x_d"):
         hybridsep.fit(X_D, T_s=1e-3)
     with pytest.raises(LogError, match=r"arrays: column 'x' .* T_s \(--T_s\)|columns? 't'"):
@@ -125,6 +125,7 @@ def test_what_cannot_be_is_refused(axis: Fit, tmp_path: Path) -> None:
         (lambda: hybridsep.cosimulate(axis.predictor(), axis.machine.new_plant(), slow), "the log is sampled every"),
         (lambda: hybridsep.backtest(axis.predictor(), 1e3 * X_D, 1e3 * X), "x_d must be in m or rad: it moves"),
         (lambda: hybridsep.backtest(axis.predictor(), X_D, X, starts=(5,)), "starts must be whole numbers from 0 on"),
+        (lambda: hybridsep.backtest(axis.predictor(), X_D, X, starts=(0.0, 0.5)), "starts must be whole numbers from"),
         (lambda: axis.report(None), "path must be of type str or PathLike, got None"),  # type: ignore[arg-type]
         (lambda: axis.build("a", progress=None), "progress must be of type Callable"),  # type: ignore[arg-type]
         (lambda: at_0.sample(None, 0.0), "x_d_ahead must be a number, got None at sample 0"),  # type: ignore[arg-type]
@@ -133,7 +134,7 @@ def test_what_cannot_be_is_refused(axis: Fit, tmp_path: Path) -> None:
         with pytest.raises((ParameterError, SignalError), match=message):
             call()
     rapid = 1e-3 * np.r_[20.0 * np.arange(100), 0.0]  # 20 m/s, then a jump; 4 m are not too many
-    assert hybridsep.backtest(axis.predictor(), rapid, rapid).n_batches == 3
+    assert hybridsep.backtest(axis.predictor(), rapid, rapid, starts=[0.0, 50.0]).n_batches == 4
     at_0.sample(0.5, 0.0)
     assert at_0._ahead[0] == 0.5
     assert "rms_h_urad" in hybridsep.backtest(axis.predictor(), replace(log, unit="rad")).summary()

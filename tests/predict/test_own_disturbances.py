@@ -25,7 +25,7 @@ def spring(x: Array, v: Array) -> Array:
 
 
 def predictor(*own: Disturbance) -> HybridPredictor:
-    return HybridPredictor(MODEL, PredictorSettings(), disturbances=own)
+    return HybridPredictor(MODEL, PredictorSettings(), disturbances=iter(own))
 
 
 def into_the_buffer() -> tuple[Array, Array]:
