@@ -27,8 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FASTER, _FASTEST = 100.0, {"m": 50.0, "rad": 1000.0}
-"""Usual motion, relative to the fastest that was learned, and speed, m/s or rad/s, from which on, both, the unit is
-another: mm are 1000 times as fast. Arrays count as metres, but may be rad: 50 rad/s are many for an axis."""
+"""Usual motion, relative to the fastest learned, and in m/s, arrays' rad/s too, or rad/s, beyond which it is in mm."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice, pairwise
+from itertools import islice, pairwise, repeat, zip_longest
 from pathlib import Path
 from typing import IO, Any, ClassVar
 
@@ -45,10 +45,11 @@ _MISSING = re.compile(
 
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
 _BELOW_1000 = re.compile(r"[+-]?\d{1,3}")
-_NOT_THOUSANDS = re.compile(r",(?!\d{3}(?!\d))")
+_NOT_THOUSANDS = re.compile(r",(?:(?!\d{3}(?!\d))|(?<=\d{4},)|(?<=(?<!\d)0,))")
 
-_COMMA, _QUOTED, _POINT = map(re.compile, (",", r'"[^",]+,', r"(?<![\w.:])(\d+\.|\.\d)\d*(?![\d.:])"))
-"""What a line has that has a comma within a number, or in quotation marks, or a number with a point."""
+_TELLS = re.compile(rf"{_NOT_THOUSANDS.pattern}|,(?=\d{{3}},)")
+_QUOTED, _POINT = map(re.compile, (r'"[^",]+,', r"(?<![\w.:])(\d+\.|\.\d)\d*(?![\d.:])"))
+"""What tells what a comma stands for, or may where commas delimit, and a number with a point."""
 
 _SECOND = 1_000_000_000  # in nanoseconds, which doubles count exactly over a day
 
@@ -83,7 +84,7 @@ class _Table:
     units: dict[str, str]  # name → unit, from a row of units below the names
     delimiter: str | None  # between columns; None is blanks
     comma: str | None  # what a comma in a number stands for: ".", nothing between thousands; None where it is an error
-    sign: re.Pattern[str] | None  # what shows, where a line below the first ones has it, that a comma may be another
+    settled: bool  # whether the first lines tell that
     header: int  # line number of the names, from 1
     first: int  # line number from which numbers are read
     clocks: set[int]  # indices of columns of timestamps with a time of day
@@ -125,14 +126,21 @@ class TextSource(Source):
 
     @cached_property
     def _comma(self) -> str | None:
-        """What a comma in a number stands for, by all rows: numbers may pass 1000 far below the first ones."""
-        table, sign = self._table, self._table.sign
+        """What a comma in a number stands for, by the first rows that tell it: numbers may pass 1000 far below."""
+        table, lines = self._table, list[str]()
+        tells, points = (_QUOTED if table.delimiter == "," else _TELLS).search, table.comma is None
         with self._open() as file:
-            if sign is None or not any(map(sign.search, islice(file, table.first - 1, None))):
-                return table.comma
-        with self._open() as file:
-            rows = [split(text.strip(" \r\n"), table.delimiter) for text in islice(file, table.first - 1, None)]
-        return _comma([[row[i] for row in rows if i < len(row)] for i in range(len(table.names))])[0]
+            rest = islice(file, table.first - 1, None)
+            while not table.settled and (block := list(islice(rest, _BLOCK))):
+                text, lines = "".join(block), lines[-1:] + block
+                if len({*map(str.count, lines, repeat(","))}) > 1 or tells(text) or (points and _POINT.search(text)):
+                    rows = [split(line.strip(" \r\n"), table.delimiter) for line in lines]
+                    columns = [list(filter(None, column)) for column in zip_longest(*rows)]
+                    # A point far below commas is another's
+                    comma, told = _comma([[a for a in one if points or "." not in a or "," in a] for one in columns])
+                    if told:
+                        return comma
+        return table.comma if table.settled else "."
 
     @staticmethod
     def recognises(head: bytes) -> bool:
@@ -210,12 +218,15 @@ class TextSource(Source):
         """Return the columns ``use`` of some lines, ``(n_lines, n_use)``, timestamps as times of day, ns."""
         mark, expected = self._table.delimiter, len(self._table.names)
         comma = self._comma if mark != "," else None
+        for number, text in numbered if self._comma == "." else ():
+            if "." in text and _POINT.search(text):
+                self._row(text, number, use)  # which refuses it in a column that is read
         whole = comma is not None and not (comma == "" and any(_NOT_THOUSANDS.search(text) for _, text in numbered))
         lines = [text.replace(",", comma or "") if whole else text for _, text in numbered]
         widths = [text.count(mark) + 1 for text in lines] if mark else [len(text.split()) for text in lines]
         if min(widths) != expected or max(widths) != expected:
             for number, text in numbered:
-                fields = split(text.strip(" \r\n"), mark)  # without delimiters between quotation marks
+                fields = split(text.strip(" \r\n"), self._table.delimiter)  # without delimiters between quotation marks
                 if len(fields) < expected or any(fields[expected:]):
                     self._row(text, number, use)  # a decimal comma is the likelier fault
                     raise LogError(
@@ -252,14 +263,14 @@ class TextSource(Source):
                 what = "a time of day such as 10:20:30.001 (up to 9 decimals)" if stamp else "a number"
                 raise LogError(
                     f"{self.path}, line {number}: column {brief(name)} must be {what}, got "
-                    f"{brief(field) if field else 'nothing'}{'' if stamp else _hint(field)}"
+                    f"{brief(field) if field else 'nothing'}{'' if stamp else _hint(field, self._comma)}"
                 ) from None
         return row
 
     def _number(self, field: str) -> float:
         """Return a number; ValueError if it is none, or a comma in it has no meaning in this file."""
         comma = self._comma
-        if "," in field and (comma is None or (comma == "" and not _THOUSANDS.fullmatch(field))):
+        if "." in field if comma == "." else "," in field and (comma is None or not _THOUSANDS.fullmatch(field)):
             raise ValueError(field)
         return _number(field.replace(",", comma or ""))
 
@@ -335,7 +346,9 @@ def _encoding(head: bytes) -> str:
     return "utf-8-sig"
 
 
-def _hint(field: str) -> str:
+def _hint(field: str, comma: str | None) -> str:
+    if comma == "." and is_number(field):
+        return "; other lines have decimal commas"
     if is_number(field.replace(".", "").replace(",", ".")) or is_number(field.replace(",", "")):
         return "; write numbers without separators of thousands"
     return "; write times of day as hh:mm:ss with up to 9 decimals, or as seconds" if ":" in field else ""
@@ -370,7 +383,7 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
         return None
     number, line = known[0]
     mark = next((mark for mark in _DELIMITERS if mark and mark in line), None)
-    return _Table(_names(line, mark), {}, mark, ".", None, number, number + 1, set())
+    return _Table(_names(line, mark), {}, mark, None, False, number, number + 1, set())
 
 
 def _width(fields: Sequence[str]) -> int:
@@ -411,10 +424,9 @@ def _with_names(
     header, names = max(nearest, key=lambda row: n_known(row[1]) if len(row[1]) == len(nearest[0][1]) else -1)
     units = dict(zip(names, above[0][1], strict=False)) if has_units else {}
     comma, settled = _comma([[row[i] for row in fields] for i in range(width)])
-    sign = _POINT if settled else _QUOTED if delimiter == "," else _COMMA
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
-    return _Table(names, stated, delimiter, comma, sign, header, rows[start][0], clocks)
+    return _Table(names, stated, delimiter, comma, settled, header, rows[start][0], clocks)
 
 
 def _is_written(text: str) -> bool:
@@ -423,16 +435,16 @@ def _is_written(text: str) -> bool:
 
 
 def _comma(columns: Sequence[Sequence[str]]) -> tuple[str | None, bool]:
-    """Return what a comma in the numbers of columns of texts stands for, and whether it cannot be of thousands."""
+    """Return what a comma in the numbers of columns of texts stands for, and whether they tell."""
     columns = [list(filter(_is_written, column)) for column in columns]
     numbers = [text for column in columns for text in column]
     commas = [text for text in numbers if "," in text]
     points = any("." in text for text in numbers)
     several = any(text.count(",") > 1 for text in commas)
     settled = not all(map(_THOUSANDS.fullmatch, commas))
-    if commas and not settled and (points or several or any(map(_passes_1000, columns))):
-        return "", False
-    return None if points else ".", settled
+    if not settled and (points or several or any(map(_passes_1000, columns))):
+        return "", True
+    return "." if commas and not points else None, settled
 
 
 def _passes_1000(column: Sequence[str]) -> bool:
