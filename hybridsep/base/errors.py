@@ -9,6 +9,8 @@ from typing import Any
 
 _LINE_MAX = 200  # largest length of another library's message within one of ours, in characters
 _LISTED_MAX = 12  # most names or problems that a message lists; more are counted
+_IN_WORDS = {"Integral": "a whole number", "Mapping": "a table (dict)", "Callable": "a function", "NoneType": "None"}
+_IN_WORDS |= {"Sequence": "a list", "Iterable": "a list", "str": "a text", "PathLike": "a path"}
 
 
 def brief(value: object) -> str:
@@ -45,8 +47,8 @@ def check_kind(kind: Any, **given: object) -> None:
     kinds = getattr(kind, "__args__", (kind,))
     for name, value in given.items():
         if not isinstance(value, kind) or (type(value) in {str, bytes, bool} - {*kinds}):
-            wanted = " or ".join(one.__name__ for one in kinds).replace("NoneType", "None")
-            raise ParameterError(f"{name} must be of type {wanted}, got {brief(value)}")
+            wanted = " or ".join(_IN_WORDS.get(one.__name__, f"of type {one.__name__}") for one in kinds)
+            raise ParameterError(f"{name} must be {wanted}, got {brief(value)}")
 
 
 def check_has(what: str, value: object, *names: str) -> None:

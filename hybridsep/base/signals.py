@@ -128,8 +128,7 @@ def as_array(values: Any, name: str, factor: _Factor = None, *, T_s: float | Non
         expected, n = T_s if labels.dtype.kind in "mM" else None, len(labels) - 1
         steps = np.diff(labels) / (np.timedelta64(1, "s") if labels.dtype.kind in "mM" else 1)
         usual = abs(float(np.median(steps)))
-        if expected is not None and abs(usual - expected) < 0.5 * expected:  # that of rounded times is another
-            usual = expected
+        usual = expected if expected and abs(usual - expected) < 0.5 * expected else usual  # times may be rounded
         if not (even := (steps > 0.0) & (steps < _GAP * usual)).all():
             i = int(np.argmin(even))
             raise SignalError(
@@ -164,7 +163,7 @@ def as_samples(
     most = max(_POSITION_MAX.values())
     if np.abs(samples).max(initial=0.0) > most:
         i = int(np.argmax(np.abs(samples)))
-        raise SignalError(f"{name} must be within ±{most:g} m or rad, got {samples[i]:g} at sample {i}")
+        raise SignalError(f"{name} must be within ±{most:g} in SI units, got {samples[i]:g} at sample {i}")
     return samples
 
 
@@ -180,11 +179,11 @@ def check_position(name: str, value: float, when: str = "", unit: str = "m", *, 
     try:
         if math.isnan(value) and may_miss:
             return
-    except TypeError:
+    except (TypeError, OverflowError):
         raise SignalError(f"{name} must be a number, got {brief(value)}{when}") from None
     if not math.isfinite(value):
         raise SignalError(f"{name} must be finite, got {value}{when}")
-    if unit not in _POSITION_MAX:
+    if unit not in tuple(_POSITION_MAX):
         raise SignalError(f"unit must be one of {', '.join(_POSITION_MAX)}, got {brief(unit)}")
     if abs(value) > _POSITION_MAX[unit]:
         raise SignalError(f"{name} must be within ±{_POSITION_MAX[unit]:g} {unit}, got {value:g}{when}")

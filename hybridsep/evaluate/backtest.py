@@ -130,9 +130,8 @@ def backtest(
     measured = as_measured(x_meas, "x_meas", len(command), T_s=T_s)
     learned: Any = predictor.residual.learned  # of the paper's model no speed
     fastest, steps = getattr(learned, "largest_step", 0.0), np.abs(np.diff(command))
-    steps = np.minimum(steps[1:], steps[:-1])  # a jump of the command is no motion
-    least = max(_FASTER * fastest, _FASTEST[unit] * T_s)
-    if len(moving := steps[steps > 0.0]) and np.median(moving) > least and fastest > 0.0:
+    moving, most = np.minimum(steps[1:], steps[:-1]), max(_FASTER * fastest, _FASTEST[unit] * T_s)  # without jumps
+    if len(moving := moving[moving > 0.0]) and np.median(moving) > most and fastest > 0.0:
         raise SignalError(
             f"x_d must be in m or rad: it moves {np.median(moving):.3g} a sample, {fastest:.3g} at most were learned; "
             "read_log({'x_d': x_d, 'x': x}, T_s=…, unit='mm') makes a log of arrays in another unit"

@@ -342,7 +342,7 @@ def fit(
     settings_to_try(default, p)  # which refuses what does not fit into the window
     ahead = None
     if look_ahead is not None:
-        look_ahead = finite(look_ahead, "look_ahead", above=0.0)
+        look_ahead = finite(look_ahead, "look_ahead, a time in s,", above=0.0)
         label = f"look_ahead = {look_ahead:g} s, in samples of {T_s:g} s,"
         ahead = PARAMETERS["preview"].checked(round(look_ahead / T_s), label)
 

@@ -126,7 +126,7 @@ class TextSource(Source):
 
     @cached_property
     def _comma(self) -> str | None:
-        """What a comma in a number stands for, by the first rows that tell it: numbers may pass 1000 far below."""
+        """What a comma in a number stands for, by the first rows that tell; a point far below commas does not."""
         table, lines = self._table, list[str]()
         tells, points = (_QUOTED if table.delimiter == "," else _TELLS).search, table.comma is None
         with self._open() as file:
@@ -136,7 +136,6 @@ class TextSource(Source):
                 if len({*map(str.count, lines, repeat(","))}) > 1 or tells(text) or (points and _POINT.search(text)):
                     rows = [split(line.strip(" \r\n"), table.delimiter) for line in lines]
                     columns = [list(filter(None, column)) for column in zip_longest(*rows)]
-                    # A point far below commas is another's
                     comma, told = _comma([[a for a in one if points or "." not in a or "," in a] for one in columns])
                     if told:
                         return comma

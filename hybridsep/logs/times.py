@@ -141,13 +141,13 @@ def _unknown_unit(path: Path, name: str, first: float, interval: float, *, count
     """Return the error of times that state no unit and are not in seconds, with the intervals that they may have."""
     units = [unit for unit, size in _CLOCKS.items() if _PLAUSIBLE[0] <= size * interval <= _PLAUSIBLE[1]]
     since = next((unit for unit in units if 3e8 < first * _CLOCKS[unit] < 1e10), "")  # 1980 to 2286
-    units = [since] if since else units
+    units = [since] if since else [name] if name in _CLOCKS else units
     guess = f", or a time in {units[0]}{' since 1970' if since else ''}" if units else ""
     hint = f"--T_s {interval * _CLOCKS[units[0]]:.4g}" if units else ""
     says = "counts samples: it is an index" if counts else f"has an interval of {interval:.6g}, no axis's in s"
     error = LogError(
         f"{path}: column {brief(name)} {says}{guess}; give T_s ({hint or '--T_s'}), or name its unit in the file, "
-        f"'{name:.60} [ms]'"
+        f"'{name:.60} [{units[0] if units else 'ms'}]'"
     )
     error.options = ((hint, "the interval between the rows, s"),) if hint else ()
     return error

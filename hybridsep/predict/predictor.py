@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..base.errors import ParameterError, SignalError, StateError, check_kind
 from ..base.files import as_path, write_whole
 from ..base.settings import PredictorSettings, check, samples_before
-from ..base.signals import Array, as_measured, as_samples
+from ..base.signals import Array, as_array, as_measured, as_samples
 from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..base.threads import one_blas_thread
 from ..model.physics import ModalModel, Mode
@@ -219,9 +219,9 @@ class HybridPredictor:
             raise SignalError("update must follow predict: there is no predicted window to measure")
         state, forecast, error = self.state, cast(Any, self.pending.forecast), self.pending.error
         residual, physics, may_miss = state.residual, state.physics, self.settings.averaging
-        measured = (as_measured if may_miss else as_samples)(x, "x", T_s=self.T_s)
-        if not 1 <= len(measured) <= self.n_pending:
-            raise SignalError(f"x must have 1 … {self.n_pending} samples, as predicted, got {len(measured)}")
+        if not 1 <= (measured := as_array(x, "x", T_s=self.T_s)).size <= self.n_pending:
+            raise SignalError(f"x must have 1 … {self.n_pending} samples, as predicted, got {measured.size}")
+        measured = (as_measured if may_miss else as_samples)(measured, "x")
         m, start, late = len(measured), forecast.window.start, len(state.late)
         e_pb = measured - start - forecast.window.x_pb[:m]
         if state.k == 0 and may_miss and not self.planned:

@@ -126,8 +126,8 @@ def test_what_cannot_be_is_refused(axis: Fit, tmp_path: Path) -> None:
         (lambda: hybridsep.backtest(axis.predictor(), 1e3 * X_D, 1e3 * X), "x_d must be in m or rad: it moves"),
         (lambda: hybridsep.backtest(axis.predictor(), X_D, X, starts=(5,)), "starts must be whole numbers from 0 on"),
         (lambda: hybridsep.backtest(axis.predictor(), X_D, X, starts=(0.0, 0.5)), "starts must be whole numbers from"),
-        (lambda: axis.report(None), "path must be of type str or PathLike, got None"),  # type: ignore[arg-type]
-        (lambda: axis.build("a", progress=None), "progress must be of type Callable"),  # type: ignore[arg-type]
+        (lambda: axis.report(None), "path must be a text or a path, got None"),  # type: ignore[arg-type]
+        (lambda: axis.build("a", progress=None), "progress must be a function, got None"),  # type: ignore[arg-type]
         (lambda: at_0.sample(None, 0.0), "x_d_ahead must be a number, got None at sample 0"),  # type: ignore[arg-type]
     ]
     for call, message in calls:

@@ -280,7 +280,7 @@ def test_every_nth_sample_of_a_slow_sensor(tmp_path: Path, period: int) -> None:
 def test_the_measured_position_is_shifted_by_an_option(tmp_path: Path) -> None:
     t = 1e-3 * np.arange(N)
     for delay in (6, -6):
-        log = read(tmp_path, t, delay=delay)
+        log = read(tmp_path, t, delay=np.int8(delay))
         assert len(log.t) == N - 6
         first = max(-delay, 0)
         np.testing.assert_array_equal(log.x_d, X_D[first : N - max(delay, 0)])

@@ -221,7 +221,7 @@ def test_the_last_accepted_residual_of_the_paper_s_model_is_what_was_measured_la
         (lambda p: p.predict([]), "x_d must have at least one sample, got none"),
         (lambda p: p.predict([0.0, math.nan]), "x_d must be finite, got nan at sample 1"),
         (lambda p: p.predict([[0.0]]), "x_d must be one-dimensional, got shape (1, 1)"),
-        (lambda p: p.update([]), "x must have at least one sample, got none"),
+        (lambda p: p.update([]), "x must have 1 … 10 samples, as predicted, got 0"),
         (lambda p: p.update(np.zeros(11)), "x must have 1 … 10 samples, as predicted, got 11"),
         (lambda p: p.update([0.0, math.inf]), "x must be finite, got inf at sample 1"),
         (lambda p: p.operator(0), "n must be 1 … 100000, got 0"),
