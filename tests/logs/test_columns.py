@@ -125,6 +125,7 @@ def test_an_index_is_told_from_time(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "t,x_d,x\n" + rows)
     message = r"column 't' counts samples: it is an index, or a time in ms; give T_s \(--T_s 0.001\), or .*'t \[ms\]'"
     refused(message, path)
+    refused(r"us \[us\]", write_csv(tmp_path / "us.csv", "us,x_d,x\n" + rows), columns={"t": "us"})
     log = read_log(path, T_s=2e-3)
     np.testing.assert_allclose(log.t, 2e-3 * np.arange(20))
     assert read_log(write_csv(path, "t [ms],x_d,x\n" + rows)).T_s == 1e-3
