@@ -280,7 +280,7 @@ class Regression(Expert):
         if rows.n_rows == 0.0:
             return None
         if kind == COMMAND_RESIDUAL:
-            command = model.command
+            command = model.static.command
             p, shares, largest = command.p, command.shares, command.largest(scales.step or 1.0)
         else:
             p, shares, largest = settings.p, model.static.shares, scales.largest
@@ -299,7 +299,7 @@ class Regression(Expert):
         if kind == COMMAND_RESIDUAL:
             square *= at.growth**2
             most = CONSTANTS.bound * (at.growth * scale.largest)
-            rows = model.command.rows(model.run.static.x_d, at.window.x_d)
+            rows = model.static.command.rows(model.run.static.x_d, at.window.x_d)
         return at.solved[self].predict(rows, model.run.past[kind], square, most, held, counts)
 
     def forecast(self, at: ExpertWindow) -> Array | float:
@@ -316,7 +316,7 @@ class Regression(Expert):
         e_h = at.predictions[self].e_h
         if self.like(model).target == MODEL_RESIDUAL:
             return e_h
-        command, most = model.command.late(model.run.static.x_d, at.window.x_d), at.growth * at.bound
+        command, most = model.static.command.late(model.run.static.x_d, at.window.x_d), at.growth * at.bound
         return np.asarray(np.clip(e_h + (command - at.window.x_pb), -most, most))
 
 

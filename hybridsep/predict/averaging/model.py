@@ -41,7 +41,7 @@ from .experts import (
     ResidualScale,
     SolvedExpert,
 )
-from .features import LEAST_VELOCITY, CommandFeatures, Disturbance, StaticFeatures, StaticState
+from .features import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
 from .gate import InnovationGate, gated
 from .recall import Memory
 from .stacking import Stack
@@ -150,11 +150,6 @@ class AveragedModel:
         learned, noise, leader = Learned.init(static.n), (0.0,) * len(REGRESSIONS), ARX_RESIDUAL.place
         run = RunState.init(settings.p, static, Memory.init(settings.recall, settings.Np))
         return cls(settings, static, learned, evidence, noise, leader, run)
-
-    @property
-    def command(self) -> CommandFeatures:
-        """Features of the expert of the command."""
-        return self.static.command
 
     @property
     def leading(self) -> Regression:
@@ -311,7 +306,7 @@ class AveragedModel:
 
         ``window``: the first one, with the motion before it; ``scales``: of the features in it.
         """
-        (x_d, x_pb, *_), command, static = window, self.command, self.run.static
+        (x_d, x_pb, *_), command, static = window, self.static.command, self.run.static
         commands = x_d[0] + (x_d[1] - x_d[0]) * np.arange(-command.n_before, 0)
         positions = x_pb[0] + (x_pb[1] - x_pb[0]) * np.arange(-max(command.n_before, len(static.x_pb)), 0)
         late = commands[-1 - command.dead_time :: -1][: command.p]
@@ -338,7 +333,7 @@ class AveragedModel:
         largest, T_s = learned.scales[MODEL_RESIDUAL].largest, self.settings.T_s
         accepted, gate = gated(run.gate, measured, largest, learned.fastest, T_s)
         e = _bridged(forecast.e_h[:m], measured, accepted)
-        e_0 = e + window.x_pb - self.command.late(run.static.x_d, window.x_d)
+        e_0 = e + window.x_pb - self.static.command.late(run.static.x_d, window.x_d)
         rows, static = self.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
         if fold:
             if run.level is None and accepted.any():
@@ -346,7 +341,7 @@ class AveragedModel:
                 rests = np.ptp(np.append(window.x_d, run.static.x_d[-1])) <= _LITTLE * abs(level)
                 run = replace(run, level=level if rests else 0.0)
                 state = replace(state, run=run)
-            of_command = self.command.rows(run.static.x_d, window.x_d)
+            of_command = self.static.command.rows(run.static.x_d, window.x_d)
             state = _folded(state, forecast, (rows, of_command), (e, e_0), accepted)
             state = _judged(state, forecast, (e, e_0), accepted, ahead) if accepted.any() else state
         past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
