@@ -69,6 +69,11 @@ static void splines_change(const hsep_splines *self, const hsep_real c[], hsep_i
         if (place >= HSEP_N_DECIDED && place < count) {
             const hsep_real c0 = c[place], c1 = c[place - 1], c2 = c[place - 2], c3 = c[place - 3];
             const hsep_real *b0 = b, *b1 = b0 + spacing, *b2 = b1 + spacing, *b3 = b2 + spacing;
+            for (; k + HSEP_LANES <= end; k += HSEP_LANES) {
+                const hsep_lanes sum = c0 * *hsep_lanes_const(b0) + c1 * *hsep_lanes_const(b1);
+                *hsep_lanes_at(delta + k) = (sum + c2 * *hsep_lanes_const(b2)) + c3 * *hsep_lanes_const(b3);
+                b0 += HSEP_LANES, b1 += HSEP_LANES, b2 += HSEP_LANES, b3 += HSEP_LANES;
+            }
             for (; k < end; k++) {
                 delta[k] = ((c0 * *b0++ + c1 * *b1++) + c2 * *b2++) + c3 * *b3++;
             }
@@ -96,7 +101,11 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         hsep_real *row = rows + order * preview;
         const hsep_real share = self->share[order];
-        for (hsep_int k = 0; k < preview; k++) {
+        hsep_int k = 0;
+        for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
+            *hsep_lanes_at(row + k) *= share;
+        }
+        for (; k < preview; k++) {
             row[k] *= share;
         }
     }

@@ -112,7 +112,14 @@ HSEP_API void hsep_cholesky_take_one(hsep_real triangle[], hsep_int n, hsep_int 
             const cholesky_reflection h = cholesky_reflect(row[0], x + k, 0, 1);
             const hsep_real v = h.v[0], tau = h.tau;
             hsep_real *restrict r = row, *restrict y = x + k;
-            for (hsep_int j = 1; j < length; j++) {
+            hsep_int j = 1;
+            for (; j + HSEP_LANES <= length; j += HSEP_LANES) {
+                hsep_lanes *of = hsep_lanes_at(r + j), *left = hsep_lanes_at(y + j);
+                const hsep_lanes w = tau * (*of + v * *left);
+                *of = w - *of;
+                *left -= v * w;
+            }
+            for (; j < length; j++) {
                 const hsep_real w = tau * (r[j] + v * y[j]);
                 r[j] = w - r[j];
                 y[j] -= v * w;

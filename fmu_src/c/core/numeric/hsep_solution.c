@@ -215,54 +215,68 @@ static void solution_forward_abreast(hsep_solution *self)
 {
     const hsep_int m = self->n_head + self->n_tail;
     const hsep_real *row = hsep_at(self, self->factor);
-    hsep_real *y = hsep_at(self, self->abreast);
-    for (hsep_int first = 0; first < m; first += 4, y += 4 * HSEP_SOLUTION_ABREAST) {
+    hsep_lanes *x = hsep_lanes_at(hsep_at(self, self->abreast));
+    for (hsep_int first = 0; first < m; first += 4) {
         const hsep_int left = m - first, height = left < 4 ? left : 4;
         const hsep_real *r[4] = {NULL};
+        hsep_lanes *y = x + HSEP_OF_FOUR * first;
         for (hsep_int i = 0; i < height; i++) {
-            for (hsep_int c = 0; c < HSEP_SOLUTION_ABREAST; c++) {
-                y[4 * i + c] /= row[0];
-                for (hsep_int j = 1; i + j < height; j++) {
-                    y[4 * (i + j) + c] -= row[j] * y[4 * i + c];
+            for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
+                y[HSEP_OF_FOUR * i + l] /= row[0];
+            }
+            for (hsep_int j = 1; i + j < height; j++) {
+                for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
+                    y[HSEP_OF_FOUR * (i + j) + l] -= row[j] * y[HSEP_OF_FOUR * i + l];
                 }
             }
             r[i] = row + (height - i);
             row += m + 1 - (first + i);
         }
-        for (hsep_int l = 0; left > 4 && l < HSEP_OF_FOUR; l++) {
+        if (left > 4) {
             const hsep_real *r0 = r[0], *r1 = r[1], *r2 = r[2], *r3 = r[3];
-            const hsep_lanes *at = hsep_lanes_const(y) + l, a0 = at[0], a1 = at[HSEP_OF_FOUR];
-            const hsep_lanes a2 = at[2 * HSEP_OF_FOUR], a3 = at[3 * HSEP_OF_FOUR];
-            hsep_lanes *to = hsep_lanes_at(y) + l + 4 * HSEP_OF_FOUR;
-            for (hsep_int j = 0; j < left - 4; j++, to += HSEP_OF_FOUR) {
-                *to = (((*to - r0[j] * a0) - r1[j] * a1) - r2[j] * a2) - r3[j] * a3;
+            for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
+                const hsep_lanes *at = y + l, a0 = at[0], a1 = at[HSEP_OF_FOUR], a2 = at[2 * HSEP_OF_FOUR];
+                const hsep_lanes a3 = at[3 * HSEP_OF_FOUR];
+                hsep_lanes *to = y + l + 4 * HSEP_OF_FOUR;
+                for (hsep_int j = 0; j < left - 4; j++, to += HSEP_OF_FOUR) {
+                    *to = (((*to - r0[j] * a0) - r1[j] * a1) - r2[j] * a2) - r3[j] * a3;
+                }
             }
         }
     }
 }
 
-/* The leverages of four rows side by side, each a sum as hsep_dot has it. */
+/* The leverages of four rows side by side. */
 static void solution_leverages_abreast(hsep_solution *self, hsep_int count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
 {
     const hsep_int m = self->n_head + self->n_tail;
     const hsep_real *rows = hsep_at(self, self->work);
-    hsep_real *x = hsep_at(self, self->abreast), sums[4][HSEP_SOLUTION_ABREAST] = {{0.0}};
+    hsep_real *to = hsep_at(self, self->abreast);
+    const hsep_lanes *x = hsep_lanes_at(to);
+    hsep_lanes sums[HSEP_OF_FOUR];
     for (hsep_int c = 0; c < HSEP_SOLUTION_ABREAST; c++) { /* what is beyond is a copy */
         const hsep_real *row = rows + (m + 1) * (c < count ? c : count - 1);
         for (hsep_int i = 0; i < m; i++) {
-            x[HSEP_SOLUTION_ABREAST * i + c] = row[i];
+            to[HSEP_SOLUTION_ABREAST * i + c] = row[i];
         }
     }
     solution_forward_abreast(self);
-    for (hsep_int i = 0; i < m; i++, x += HSEP_SOLUTION_ABREAST) {
-        hsep_real *sum = sums[i < m - m % 4 ? i % 4 : 0];
-        for (hsep_int c = 0; c < HSEP_SOLUTION_ABREAST; c++) {
-            sum[c] += x[c] * x[c];
+    for (hsep_int l = 0; l < HSEP_OF_FOUR; l++, x++) { /* as hsep_dot has each; a sum with a name has a register */
+        hsep_lanes s0 = {0.0}, s1 = s0, s2 = s0, s3 = s0;
+        const hsep_lanes *at = x;
+        hsep_int i = 0;
+        for (; i + 4 <= m; i += 4, at += 4 * HSEP_OF_FOUR) {
+            s0 += at[0] * at[0];
+            s1 += at[HSEP_OF_FOUR] * at[HSEP_OF_FOUR];
+            s2 += at[2 * HSEP_OF_FOUR] * at[2 * HSEP_OF_FOUR];
+            s3 += at[3 * HSEP_OF_FOUR] * at[3 * HSEP_OF_FOUR];
         }
+        for (; i < m; i++, at += HSEP_OF_FOUR) {
+            s0 += *at * *at;
+        }
+        sums[l] = (s0 + s1) + (s2 + s3);
     }
-    for (hsep_int c = 0; c < HSEP_SOLUTION_ABREAST; c++) {
-        leverages[c] = (sums[0][c] + sums[1][c]) + (sums[2][c] + sums[3][c]);
-    }
+    memcpy(leverages, sums, sizeof sums);
 }
 #endif
 

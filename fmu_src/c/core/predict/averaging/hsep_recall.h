@@ -53,9 +53,17 @@ static inline hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predic
 static inline void recall_add(
     hsep_real *restrict distances, const hsep_real *restrict changes, hsep_int count, hsep_real now, hsep_real fading)
 {
-    for (hsep_int i = 0; i < count; i++) {
+    const hsep_int whole = count - count % HSEP_LANES;
+    const hsep_real alike = HSEP_RECALL_ALIKE;
+    hsep_int i = 0;
+    for (; i < whole; i += HSEP_LANES) {
+        hsep_lanes *to = hsep_lanes_at(distances + i);
+        const hsep_lanes difference = now - *hsep_lanes_const(changes + i);
+        *to = fading * *to + (difference * difference + alike);
+    }
+    for (; i < count; i++) {
         const hsep_real difference = now - changes[i];
-        distances[i] = fading * distances[i] + (difference * difference + HSEP_RECALL_ALIKE);
+        distances[i] = fading * distances[i] + (difference * difference + alike);
     }
 }
 
