@@ -37,7 +37,8 @@ class Stop:
         self.rows = bounds.rows_of(basis.acting(preview, -(-preview // basis.spacing)))
         self.n = self.rows.shape[1]  # coefficients, the decided ones first
         shared, last = N_DECIDED + self.n_shared, N_DECIDED + (preview - PLAN_END) // basis.spacing - 2
-        held, steps = np.tri(self.n + 3, last), np.diff(np.eye(shared), 1, 0, 0.0)  # by steps: well conditioned
+        held = np.tri(self.n + 3, last)
+        steps = np.diff(np.eye(shared), axis=0, prepend=0.0)  # of the coefficients: they are well conditioned
         # The least sum of squares of the differences of orders 1 to 3, in limits, behind what is shared
         weights = enumerate(bounds.shares(basis.spacing), start=1)
         least = np.concatenate([share * np.diff(held, order, axis=0)[shared - order :] for order, share in weights])

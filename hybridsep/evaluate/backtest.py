@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FASTER, _FASTEST = 100.0, {"m": 50.0, "rad": 1000.0}
-"""Usual motion, relative to the fastest learned, and in m/s, arrays' rad/s too, or rad/s, beyond which it is in mm."""
+"""Factor of the fastest motion learned, and speed, m/s (of arrays, too) or rad/s: above both, positions are in mm."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -206,8 +206,8 @@ def fit_structure(
         residual, linear, offset = problem.solve(theta)
         rms = float(np.sqrt(np.mean(residual**2)))
         if best is None or rms < best.rms:
-            at_end = (theta < low + _EDGE) | (theta > high - _EDGE) & (np.arange(len(theta)) < 2 * structure.n_modes)
-            best = Fit(structure, delay, theta, linear, offset, rms, slowest, bool(at_end.any()))
+            at_bound = bool((theta < low + _EDGE).any() or (theta > high - _EDGE)[: 2 * structure.n_modes].any())
+            best = Fit(structure, delay, theta, linear, offset, rms, slowest, at_bound)
     assert best is not None  # there is a start
     return best
 

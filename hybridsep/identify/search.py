@@ -94,7 +94,7 @@ def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, ra
     if structure.n_modes == 1 and not structure.lag:
         return [np.log([factor * rate, zeta]) for factor, zeta in ((1.0, 0.5), (2.0, 0.9), (4.0, 0.3))]
     n_modes = structure.n_modes - (not structure.lag)
-    bases = [fit for other, fit in known.items() if other.n_modes == n_modes and other.lag <= (not structure.lag)]
+    bases = [fit for other, fit in known.items() if other.n_modes == n_modes and not (other.lag and structure.lag)]
     if not bases:
         return []
     base = min(bases, key=lambda fit: fit.rms).theta[: 2 * n_modes]

@@ -143,7 +143,7 @@ def compare_structures(
         residual = _held_out_error(fit, split, T_s)
         found.append((fit, residual, _objection(fit, split, T_s)))
         rms = float(np.std(residual))
-        if rms < best * (1 - TOLERANCE):  # objections too: it may take a pole more
+        if rms < best * (1 - TOLERANCE):  # whatever is objected to it: a pole more may mend that
             best, best_order, white = rms, structure.order, _is_white(residual)
     offsets = [fit.offset for fit, _, _ in found if fit.structure.order] or [found[0][0].offset]
     common = float(np.median(offsets))

@@ -136,7 +136,7 @@ class TextSource(Source):
                 if len({*map(str.count, lines, repeat(","))}) > 1 or tells(text) or (points and _POINT.search(text)):
                     rows = [split(line.strip(" \r\n"), table.delimiter) for line in lines]
                     columns = [list(filter(None, column)) for column in zip_longest(*rows)]
-                    comma, told = _comma([[a for a in one if points or "." not in a or "," in a] for one in columns])
+                    comma, told = _comma_of([[a for a in one if points or "." not in a or "," in a] for one in columns])
                     if told:
                         return comma
         return table.comma if table.settled else "."
@@ -217,8 +217,8 @@ class TextSource(Source):
         """Return the columns ``use`` of some lines, ``(n_lines, n_use)``, timestamps as times of day, ns."""
         mark, expected = self._table.delimiter, len(self._table.names)
         comma = self._comma if mark != "," else None
-        for number, text in numbered if self._comma == "." else ():
-            if "." in text and _POINT.search(text):
+        for number, text in numbered:
+            if self._comma == "." and "." in text and _POINT.search(text):
                 self._row(text, number, use)  # which refuses it in a column that is read
         whole = comma is not None and not (comma == "" and any(_NOT_THOUSANDS.search(text) for _, text in numbered))
         lines = [text.replace(",", comma or "") if whole else text for _, text in numbered]
@@ -269,7 +269,7 @@ class TextSource(Source):
     def _number(self, field: str) -> float:
         """Return a number; ValueError if it is none, or a comma in it has no meaning in this file."""
         comma = self._comma
-        if "." in field if comma == "." else "," in field and (comma is None or not _THOUSANDS.fullmatch(field)):
+        if ("." in field) if comma == "." else ("," in field and (comma is None or not _THOUSANDS.fullmatch(field))):
             raise ValueError(field)
         return _number(field.replace(",", comma or ""))
 
@@ -422,7 +422,7 @@ def _with_names(
     nearest = above[has_units:][:2]  # the one with more known names counts
     header, names = max(nearest, key=lambda row: n_known(row[1]) if len(row[1]) == len(nearest[0][1]) else -1)
     units = dict(zip(names, above[0][1], strict=False)) if has_units else {}
-    comma, settled = _comma([[row[i] for row in fields] for i in range(width)])
+    comma, settled = _comma_of([[row[i] for row in fields] for i in range(width)])
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
     return _Table(names, stated, delimiter, comma, settled, header, rows[start][0], clocks)
@@ -433,7 +433,7 @@ def _is_written(text: str) -> bool:
     return is_number(decimal_points(text)) or bool(_THOUSANDS.fullmatch(text))
 
 
-def _comma(columns: Sequence[Sequence[str]]) -> tuple[str | None, bool]:
+def _comma_of(columns: Sequence[Sequence[str]]) -> tuple[str | None, bool]:
     """Return what a comma in the numbers of columns of texts stands for, and whether they tell."""
     columns = [list(filter(_is_written, column)) for column in columns]
     numbers = [text for column in columns for text in column]

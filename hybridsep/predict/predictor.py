@@ -69,7 +69,7 @@ class HybridPredictor:
 
     Attributes
     ----------
-    planned : int
+    preview : int
         Samples of the command that a compensator, which decides it, knows ahead; 0 without one.
     state : PredictorState
     pending : PredictedWindow, optional
@@ -94,7 +94,7 @@ class HybridPredictor:
         check_kind(Iterable, disturbances=disturbances)
         self.settings = settings = PredictorSettings() if settings is None else settings
         self.Np, self.T_s = settings.Np, settings.T_s
-        self.model, self.disturbances, self.planned = model, tuple(disturbances), 0
+        self.model, self.disturbances, self.preview = model, tuple(disturbances), 0
         self.discrete = model.discretise(self.T_s, settings.input_hold, block=self.Np)
         if self.disturbances and not settings.averaging:
             raise ParameterError("disturbances are learned with averaging = true only")
@@ -129,7 +129,7 @@ class HybridPredictor:
 
     def plan_ahead(self, preview: int) -> None:
         """Adapt to a compensator, which moves the drive as it commands, from rest, ``preview`` samples ahead."""
-        self.planned = preview
+        self.preview = preview
         self.state = replace(self.state, residual=self.residual.plan_ahead(preview))
 
     @property
@@ -224,7 +224,7 @@ class HybridPredictor:
         measured = (as_measured if may_miss else as_samples)(measured, "x")
         m, start, late = len(measured), forecast.window.start, len(state.late)
         e_pb = measured - start - forecast.window.x_pb[:m]
-        if state.k == 0 and may_miss and not self.planned:
+        if state.k == 0 and may_miss and not self.preview:
             # The run may have begun in motion.
             x_d, x_pb, _, path = forecast.window
             before = motion_before(self.model, self.discrete, x_d, e_pb - error.e_h[:m], late)
@@ -324,7 +324,7 @@ class HybridPredictor:
             "settings": asdict(self.settings),
             "dead_time": self.model.dead_time,
             "n_disturbances": len(self.disturbances),
-            "preview": self.planned,
+            "preview": self.preview,
             "pending_start": None,
         }
         modes = [[mode.f_n, mode.zeta, mode.alpha, mode.beta] for mode in self.model.modes]

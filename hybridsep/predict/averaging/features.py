@@ -5,8 +5,8 @@ lags, is ``G_pb`` applied to a candidate disturbance ``d``: friction ``tanh(v/v_
 ``v_i``; friction before sliding and backlash, which follow the distance since a reversal, the stop operators of Prandtl
 and Ishlinskii ``u_i ← clip(u_i + Δx_d, −r_i, r_i)`` over a spread of distances ``r_i``; stiffness ``x·|x|`` and damping
 ``v·|v|``; where a period is given, ``sin`` and ``cos`` of the position over it, as of cogging or a screw's pitch; and
-functions of the user's own. First differences of the features take up errors
-of ``G_pb`` in phase. As nothing here depends on the learned weights, no recursion can become unstable.
+functions of the user's own. First differences of them take up errors of ``G_pb`` in phase, changes of the command what
+it lacks. As nothing here depends on the learned weights, no recursion can become unstable.
 
 The expert without a physics model, eq. (4) with ``G_pb = 1``, predicts the residual of the command,
 ``e_0(k) = x(k) − x_d(k − d)``, where ``d`` is the physics model's dead time less two samples, at least 0; its features

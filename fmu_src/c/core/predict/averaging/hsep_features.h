@@ -3,9 +3,8 @@
  *
  * Static features are without lags. A row is [1 | x_pb and its differences | changes of the command over spans |
  * filtered disturbances | their first differences]. The expert without a physics model, eq. (4) with G_pb = 1, has
- * increments of the command. Positions are
- * relative to the start. Of n samples, sample k is at place n - 1 - k: newest first, as their past is behind them.
- * Blocks as hsep_layout.h has them.
+ * increments of the command. Positions are relative to the start. Of n samples, sample k is at place n - 1 - k: newest
+ * first, as their past is behind them. Blocks as hsep_layout.h has them.
  */
 #ifndef HSEP_FEATURES_H
 #define HSEP_FEATURES_H
