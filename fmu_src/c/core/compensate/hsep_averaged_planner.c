@@ -7,38 +7,38 @@ static const hsep_tolerance averaged_planner_tolerance = {HSEP_NEWTON_TOLERANCE}
 
 HSEP_ASSERT(lengths, sizeof averaged_planner_lengths == HSEP_AVERAGED_TRIES * sizeof(hsep_real));
 
-HSEP_API hsep_real hsep_averaged_planner_lay_out(
-    hsep_averaged_planner *self, const hsep_predictor_parameters *parameters, const hsep_planner_parameters *planner)
+HSEP_API hsep_real
+hsep_averaged_planner_lay_out(hsep_averaged_planner *self, const hsep_compensator_parameters *parameters)
 {
-    const hsep_int n = hsep_splines_count(planner->preview, planner->spacing);
-    const hsep_real all = (hsep_real)hsep_predicted(parameters), coefficients = HSEP_N_DECIDED + (hsep_real)n,
-                    filter = hsep_physics_lay_out(&(hsep_physics){0}, parameters);
-    const hsep_int n_pinned = hsep_planner_n_pinned(planner);
-    const hsep_int m = hsep_knots_of(n - n_pinned, planner->window).m;
-    const hsep_real preview = (hsep_real)planner->preview;
+    const hsep_predictor_parameters *predictor = &parameters->predictor;
+    const hsep_knots knots = hsep_planner_knots(parameters);
+    const hsep_int spacing = parameters->settings.spacing, n = hsep_splines_count(predictor->horizon, spacing);
+    const hsep_real all = (hsep_real)hsep_predicted(predictor), preview = (hsep_real)predictor->horizon;
+    const hsep_real filter = hsep_physics_lay_out(&(hsep_physics){0}, predictor), m = (hsep_real)knots.m;
+    const hsep_real coefficients = HSEP_N_DECIDED + (hsep_real)n;
     hsep_real end = HSEP_WORDS(hsep_averaged_planner);
-    self->preview = planner->preview;
-    self->late = hsep_late(&parameters->settings);
-    self->Np = planner->Np;
+    self->preview = predictor->horizon;
+    self->late = hsep_late(&predictor->settings);
+    self->Np = predictor->settings.Np;
     self->n = n;
-    self->m = m;
-    const int few = n_pinned * planner->spacing < HSEP_NEWTON_TWICE;
-    self->n_steps = few ? 1 : HSEP_NEWTON_THRICE * planner->Np <= planner->preview ? 2 : 3;
+    self->m = knots.m;
+    const int few = (n - knots.n) * spacing < HSEP_NEWTON_TWICE;
+    self->n_steps = few ? 1 : HSEP_NEWTON_THRICE * self->Np <= self->preview ? 2 : 3;
     self->rest = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
     self->of_physics = hsep_take(&end, coefficients);
     self->command = hsep_take(&end, all);
     self->x_pb = hsep_take(&end, all);
-    self->e_h = hsep_take(&end, all + (hsep_real)parameters->settings.p);
+    self->e_h = hsep_take(&end, all + (hsep_real)predictor->settings.p);
     self->target = hsep_take(&end, preview);
     self->weight = hsep_take(&end, preview);
     self->corrected = hsep_take(&end, (hsep_real)n);
-    self->begins = hsep_take(&end, (hsep_real)m);
-    self->shapes = hsep_take(&end, HSEP_AVERAGED_SHAPES * (hsep_real)planner->spacing);
+    self->begins = hsep_take(&end, m);
+    self->shapes = hsep_take(&end, HSEP_AVERAGED_SHAPES * (hsep_real)spacing);
     self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
-    self->gram = hsep_take(&end, hsep_triangle(m));
-    self->W = hsep_take(&end, (hsep_real)m * preview);
-    self->linearised = hsep_take_block(&end, hsep_linearised_lay_out(&(hsep_linearised){0}, parameters));
+    self->gram = hsep_take(&end, hsep_triangle(knots.m));
+    self->W = hsep_take(&end, m * preview);
+    self->linearised = hsep_take_block(&end, hsep_linearised_lay_out(&(hsep_linearised){0}, predictor));
     self->physics = hsep_take_block(&end, filter);
     self->trial = hsep_take_block(&end, filter);
     return end * sizeof(hsep_real);
@@ -254,15 +254,15 @@ static void averaged_planner_shape_all(hsep_averaged_planner *self, hsep_planner
 }
 
 HSEP_API void hsep_averaged_planner_init(
-    hsep_averaged_planner *self, const hsep_predictor_parameters *parameters, const hsep_planner_parameters *planner,
-    hsep_planner *plans, const hsep_real spline[])
+    hsep_averaged_planner *self, const hsep_compensator_parameters *parameters, hsep_planner *plans,
+    const hsep_real spline[])
 {
-    (void)hsep_averaged_planner_lay_out(self, parameters, planner);
-    self->pause =
-        (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / ((hsep_real)self->Np * parameters->settings.T_s) + 0.5);
+    (void)hsep_averaged_planner_lay_out(self, parameters);
+    const hsep_real window = (hsep_real)self->Np * parameters->predictor.settings.T_s; /* s */
+    self->pause = (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / window + 0.5);
     self->share = 1.0;
     self->reach = HSEP_NEWTON_FIRST_REACH;
-    hsep_linearised_init(hsep_part(self, self->linearised), parameters);
+    hsep_linearised_init(hsep_part(self, self->linearised), &parameters->predictor);
     const hsep_int half = self->preview / 2, begin = self->Np > half ? self->Np : half, falling = self->preview - begin;
     hsep_real *weight = hsep_at(self, self->weight);
     for (hsep_int k = 0; k < self->preview; k++) {

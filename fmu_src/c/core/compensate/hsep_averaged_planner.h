@@ -84,14 +84,14 @@ typedef struct {
     const hsep_real *load; /* (preview,) m, and what the drive's load adds to them */
 } hsep_averaged_task;
 
-HSEP_API hsep_real hsep_averaged_planner_lay_out(
-    hsep_averaged_planner *self, const hsep_predictor_parameters *parameters, const hsep_planner_parameters *planner);
+HSEP_API hsep_real
+hsep_averaged_planner_lay_out(hsep_averaged_planner *self, const hsep_compensator_parameters *parameters);
 
 /* Fill the block, which is 0, with the planner that solves its plans and a spline filtered by the physics model,
  * (preview,), m/m. Cost: m^2 preview / 4 multiply-adds. */
 HSEP_API void hsep_averaged_planner_init(
-    hsep_averaged_planner *self, const hsep_predictor_parameters *parameters, const hsep_planner_parameters *planner,
-    hsep_planner *plans, const hsep_real spline[]);
+    hsep_averaged_planner *self, const hsep_compensator_parameters *parameters, hsep_planner *plans,
+    const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
  * averaged, which judges plans once the warm-up is over. It predicts only the samples

@@ -16,11 +16,10 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_c
     self->target = hsep_take(&end, horizon);
     self->spline_pb = hsep_take(&end, horizon);
     self->trial = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, predictor));
-    self->planner = hsep_take_block(&end, hsep_planner_lay_out(&(hsep_planner){0}, &parameters->planner));
+    self->planner = hsep_take_block(&end, hsep_planner_lay_out(&(hsep_planner){0}, parameters));
     self->predictor = hsep_take_block(&end, hsep_predictor_lay_out(&(hsep_predictor){0}, predictor));
     if (predictor->averaging.averaging) {
-        self->averaged = hsep_take_block(
-            &end, hsep_averaged_planner_lay_out(&(hsep_averaged_planner){0}, predictor, &parameters->planner));
+        self->averaged = hsep_take_block(&end, hsep_averaged_planner_lay_out(&(hsep_averaged_planner){0}, parameters));
     }
     return end * sizeof(hsep_real);
 }
@@ -41,10 +40,10 @@ HSEP_API void hsep_compensator_block_init(
     memset(self, 0, (size_t)hsep_compensator_lay_out(self, parameters));
     (void)hsep_compensator_lay_out(self, parameters);
     hsep_predictor_block_init(hsep_compensator_predictor(self), predictor, start);
-    hsep_planner_init(hsep_compensator_planner(self), &parameters->planner, start);
-    self->compensate = self->compensate_next = (hsep_int)parameters->compensate;
-    self->change_max_next = parameters->planner.limit[0];
-    self->error_max = parameters->error_max;
+    hsep_planner_init(hsep_compensator_planner(self), parameters, start);
+    self->compensate = self->compensate_next = parameters->settings.compensate;
+    self->change_max_next = parameters->settings.change_max;
+    self->error_max = parameters->settings.following_error_max;
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
     /* The spline filtered by the physics model from rest, which is constant. */
     hsep_physics *trial = compensator_trial(self);
@@ -54,8 +53,7 @@ HSEP_API void hsep_compensator_block_init(
         spline[k] = hsep_physics_respond(trial, k < 4 * splines->spacing ? hsep_splines_shape(splines)[k] : 0.0);
     }
     if (self->averaged) {
-        hsep_averaged_planner_init(
-            hsep_compensator_averaged(self), predictor, &parameters->planner, hsep_compensator_planner(self), spline);
+        hsep_averaged_planner_init(hsep_compensator_averaged(self), parameters, hsep_compensator_planner(self), spline);
     }
 }
 

@@ -22,14 +22,6 @@
 #include "hsep_predictor.h"
 #include "hsep_averaged_planner.h"
 
-typedef struct {
-    hsep_predictor_parameters predictor; /* planned */
-    hsep_planner_parameters planner;     /* Np, preview and horizon as the predictor's */
-    hsep_sep_state compensate;
-    hsep_int n_lost;     /* samples without a measurement after which the change fades; 0: never */
-    hsep_real error_max; /* m, largest following error; 0: none */
-} hsep_compensator_parameters;
-
 /* Samples in a row above the largest following error that trip: one or two may be outliers of the sensor. Missing ones
  * do not count. */
 #define HSEP_OVER 3

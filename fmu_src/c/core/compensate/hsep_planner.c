@@ -25,18 +25,29 @@ typedef struct {
 } hsep_stop;
 HSEP_ASSERT_WORDS(hsep_stop, 13);
 
-HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters)
+/* Splines that a bounded plan leaves as they are. */
+static hsep_int planner_n_pinned(const hsep_compensator_parameters *parameters)
 {
-    const hsep_int half = parameters->Np / 2;
-    return (half < parameters->pinned ? half : parameters->pinned) / parameters->spacing;
+    const hsep_int half = parameters->predictor.settings.Np / 2;
+    const hsep_int most =
+        parameters->predictor.averaging.averaging ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER;
+    return (half < most ? half : most) / parameters->settings.spacing;
 }
 
-static hsep_real stop_lay_out(hsep_stop *self, const hsep_planner_parameters *parameters)
+HSEP_API hsep_knots hsep_planner_knots(const hsep_compensator_parameters *parameters)
 {
-    const hsep_int preview = parameters->known, spacing = parameters->spacing;
+    const hsep_predictor_parameters *predictor = &parameters->predictor;
+    const hsep_int spacing = parameters->settings.spacing, n = hsep_splines_count(predictor->horizon, spacing);
+    const int wider = predictor->averaging.averaging && predictor->horizon == predictor->preview;
+    return hsep_knots_of(n - planner_n_pinned(parameters), wider ? predictor->settings.Np / spacing : 0);
+}
+
+static hsep_real stop_lay_out(hsep_stop *self, const hsep_compensator_parameters *parameters)
+{
+    const hsep_int preview = parameters->predictor.preview, spacing = parameters->settings.spacing;
     hsep_real end = HSEP_WORDS(hsep_stop);
     self->preview = preview;
-    self->shared = parameters->Np / spacing + hsep_planner_n_pinned(parameters);
+    self->shared = parameters->predictor.settings.Np / spacing + planner_n_pinned(parameters);
     self->n = (preview - HSEP_SPLINES_END) / spacing - 2;
     self->count = HSEP_N_DECIDED + (preview + spacing - 1) / spacing;
     self->last = hsep_take(&end, (hsep_real)self->count);
@@ -50,16 +61,17 @@ static hsep_real stop_lay_out(hsep_stop *self, const hsep_planner_parameters *pa
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters)
+HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_compensator_parameters *parameters)
 {
-    const hsep_real preview = (hsep_real)parameters->preview;
-    const hsep_int n = hsep_splines_count(parameters->preview, parameters->spacing);
+    const hsep_predictor_parameters *predictor = &parameters->predictor;
+    const hsep_int spacing = parameters->settings.spacing, n = hsep_splines_count(predictor->horizon, spacing);
+    const hsep_real preview = (hsep_real)predictor->horizon;
     hsep_real end = HSEP_WORDS(hsep_planner);
-    self->Np = parameters->Np;
-    self->n_pinned = hsep_planner_n_pinned(parameters);
-    self->no_reversal = parameters->no_reversal != 0;
-    self->knots = hsep_knots_of(n - self->n_pinned, parameters->window);
-    self->jerk_weight = parameters->jerk_weight;
+    self->Np = predictor->settings.Np;
+    self->n_pinned = planner_n_pinned(parameters);
+    self->no_reversal = parameters->settings.no_reversal;
+    self->knots = hsep_planner_knots(parameters);
+    self->jerk_weight = parameters->settings.jerk_weight;
     self->c = hsep_take(&end, HSEP_N_DECIDED + (hsep_real)n);
     self->total = hsep_take(&end, HSEP_ORDERS * preview);
     self->own = hsep_take(&end, HSEP_ORDERS * preview);
@@ -67,10 +79,9 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_p
     self->third = hsep_take(&end, preview);
     self->P = hsep_take(&end, hsep_triangle(n));
     self->factor = hsep_take(&end, hsep_triangle(n));
-    self->splines =
-        hsep_take_block(&end, hsep_splines_lay_out(&(hsep_splines){0}, parameters->preview, parameters->spacing));
-    self->interior = hsep_take_block(&end, hsep_interior_size(parameters->preview, n));
-    if (parameters->known < parameters->preview) {
+    self->splines = hsep_take_block(&end, hsep_splines_lay_out(&(hsep_splines){0}, predictor->horizon, spacing));
+    self->interior = hsep_take_block(&end, hsep_interior_size(predictor->horizon, n));
+    if (predictor->preview < predictor->horizon) {
         self->stop = hsep_take_block(&end, stop_lay_out(&(hsep_stop){0}, parameters));
     }
     return end * sizeof(hsep_real);
@@ -102,14 +113,19 @@ static void stop_gains(hsep_stop *self, const hsep_splines *splines)
     }
 }
 
-HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start)
+HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_compensator_parameters *parameters, hsep_real start)
 {
+    const hsep_compensator_settings *settings = &parameters->settings;
+    const hsep_real T_s = parameters->predictor.settings.T_s;
+    const hsep_real limits[HSEP_ORDERS] = {
+        settings->change_max, settings->v_max * T_s, settings->a_max * (T_s * T_s),
+        settings->j_max * (T_s * T_s * T_s)};
     (void)hsep_planner_lay_out(self, parameters);
     self->change = 1.0;
     for (int i = 0; i < 3; i++) {
         self->x_d_before[i] = start;
     }
-    hsep_splines_init(hsep_part(self, self->splines), parameters->preview, parameters->spacing, parameters->limit);
+    hsep_splines_init(hsep_part(self, self->splines), parameters->predictor.horizon, settings->spacing, limits);
     if (self->stop > 0) {
         const hsep_splines *splines = hsep_planner_splines(self);
         hsep_stop *stop = hsep_part(self, self->stop);

@@ -11,18 +11,15 @@
 
 #include "hsep_interior.h"
 #include "hsep_splines.h"
+#include "hsep_window.h"
 
+/* Parameters of a compensator and its planners. A plan is as long as the predictor's horizon, at least Np + 4 spacing +
+ * 3; behind the preview x_d goes on as it may not. */
 typedef struct {
-    hsep_int Np;                  /* samples of a window */
-    hsep_int preview;             /* samples of a plan, at least Np + 4 spacing + 3 */
-    hsep_int known;               /* samples of it whose commands are known; behind them x_d goes on as it may not */
-    hsep_int spacing;             /* samples between knots, a divisor of Np */
-    hsep_real jerk_weight;        /* of the third differences of delta against the tracking error, >= 0 */
-    hsep_real limit[HSEP_ORDERS]; /* of |delta|, m, and of the differences of x_dm of orders 1 to 3, m; all > 0 */
-    int no_reversal;              /* whether x_dm keeps the direction of x_d */
-    hsep_int pinned;              /* samples that follow the last plan, or Np / 2 if less */
-    hsep_int window; /* splines of one, behind two of which changes are solved for wider ones; 0: nowhere */
-} hsep_planner_parameters;
+    hsep_predictor_parameters predictor; /* planned */
+    hsep_compensator_settings settings;
+    hsep_int n_lost; /* samples without a measurement after which the change fades; 0: never */
+} hsep_compensator_parameters;
 
 typedef struct {
     hsep_int Np;
@@ -41,7 +38,7 @@ typedef struct {
     hsep_int P;      /* triangle of n rows */
     hsep_int factor; /* triangle of n rows */
     hsep_int splines, interior;
-    hsep_knots knots;  /* that a change of the last plan is solved for, */
+    hsep_knots knots;  /* of changes of the last plan, */
     hsep_knots solved; /* and those of this cost */
     hsep_int stop;     /* of plans that are longer than what is known; 0: none is */
 } hsep_planner;
@@ -76,12 +73,12 @@ typedef enum {
     HSEP_PLAN_OPEN     /* it is to be solved */
 } hsep_plan_status;
 
-HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_planner_parameters *parameters);
-/* Fill the block, which is 0, for a drive at rest at start, m. */
-HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_planner_parameters *parameters, hsep_real start);
+/* Knots that a change of the last plan is solved for: of the splines that a bounded plan does not leave as they are. */
+HSEP_API hsep_knots hsep_planner_knots(const hsep_compensator_parameters *parameters);
 
-/* Splines that a bounded plan leaves as they are. */
-HSEP_API hsep_int hsep_planner_n_pinned(const hsep_planner_parameters *parameters);
+HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_compensator_parameters *parameters);
+/* Fill the block, which is 0, for a drive at rest at start, m. */
+HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_compensator_parameters *parameters, hsep_real start);
 
 /* Samples that a bounded plan leaves as they are: the time to solve it in. */
 static inline hsep_int hsep_planner_pinned(const hsep_planner *self)

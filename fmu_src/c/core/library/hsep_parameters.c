@@ -102,33 +102,19 @@ HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *
 HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_parameters *parameters)
 {
     const hsep_compensator_settings *settings = &parameters->compensator;
+    const hsep_int Np = parameters->predictor.Np, preview = settings->preview;
     const hsep_real T_s = parameters->predictor.T_s, t_init = parameters_t_init(parameters);
-    hsep_compensator_parameters derived = {.predictor = hsep_predictor_derive(parameters)};
-    const hsep_int Np = parameters->predictor.Np;
+    hsep_compensator_parameters derived = {
+        .predictor = hsep_predictor_derive(parameters),
+        .settings = *settings,
+        .n_lost = (hsep_int)parameters_samples(settings->measurement_timeout, T_s)};
     /* Behind the window, and what the next one leaves as it is, a stop has to fit into the preview. */
-    const int fits = settings->preview >= Np + Np / 2 + 5 * settings->spacing + HSEP_SPLINES_END;
-    const hsep_int horizon = fits && settings->horizon > settings->preview ? settings->horizon : settings->preview;
-    derived.predictor.preview = settings->preview;
-    derived.predictor.horizon = horizon;
+    const int fits = preview >= Np + Np / 2 + 5 * settings->spacing + HSEP_SPLINES_END;
+    derived.predictor.preview = preview;
+    derived.predictor.horizon = fits && settings->horizon > preview ? settings->horizon : preview;
     /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
      * known. */
-    derived.predictor.n_init =
-        parameters_samples(t_init > 0.0 ? t_init + (hsep_real)settings->preview * T_s : 0.0, T_s);
+    derived.predictor.n_init = parameters_samples(t_init > 0.0 ? t_init + (hsep_real)preview * T_s : 0.0, T_s);
     derived.predictor.planned = 1;
-    derived.planner = (hsep_planner_parameters){
-        .Np = parameters->predictor.Np,
-        .preview = horizon,
-        .known = settings->preview,
-        .spacing = settings->spacing,
-        .jerk_weight = settings->jerk_weight,
-        .limit =
-            {settings->change_max, settings->v_max * T_s, settings->a_max * (T_s * T_s),
-             settings->j_max * (T_s * T_s * T_s)},
-        .no_reversal = settings->no_reversal != 0,
-        .pinned = parameters->averaging.averaging ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER,
-        .window = parameters->averaging.averaging && horizon == settings->preview ? Np / settings->spacing : 0};
-    derived.compensate = (hsep_sep_state)settings->compensate;
-    derived.error_max = settings->following_error_max;
-    derived.n_lost = (hsep_int)parameters_samples(settings->measurement_timeout, T_s);
     return derived;
 }
