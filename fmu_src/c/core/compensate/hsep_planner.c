@@ -54,10 +54,11 @@ static hsep_real stop_lay_out(hsep_stop *self, const hsep_compensator_parameters
     self->own = hsep_take(&end, (hsep_real)self->count);
     self->now = hsep_take(&end, (hsep_real)self->count);
     self->gains = hsep_take(&end, 2.0 * (hsep_real)(self->n - self->shared));
-    hsep_int *const of_rows[5] = {&self->low, &self->high, &self->start, &self->way, &self->own_rows};
-    for (int i = 0; i < 5; i++) {
-        *of_rows[i] = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
-    }
+    self->low = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
+    self->high = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
+    self->start = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
+    self->way = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
+    self->own_rows = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
     return end * sizeof(hsep_real);
 }
 
@@ -134,24 +135,38 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_compensator_param
     }
 }
 
-HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
+/* Rows of x_dm, (4 preview,) in shares, under the first count coefficients of the remainder of the last plan; of order
+ * 0 of the change alone. exceeded: as hsep_splines_exceeded has it. */
+static void planner_totals(
+    const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int preview, hsep_real total[],
+    hsep_real exceeded[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int preview = splines->preview;
-    hsep_real *total = hsep_at(self, self->total), *moves = hsep_at(self, self->moves);
     /* apart: a sum would be rounded to what a position is, much coarser than a third difference of a change */
     hsep_real path[HSEP_ORDERS], change[HSEP_ORDERS];
-    hsep_splines_exceeded(splines, x_d, self->x_d_before, preview, hsep_at(self, self->own));
+    hsep_splines_exceeded(splines, x_d, self->x_d_before, preview, exceeded);
     hsep_differ_from(path, self->x_d_before);
     hsep_differ_from(change, self->delta_before);
     for (hsep_int k = 0; k < preview; k++) {
         hsep_differ(path, x_d[k]);
-        hsep_differ(change, hsep_planner_delta(self, k));
-        moves[k] = self->no_reversal ? (hsep_real)((path[1] > HSEP_QP_MOVES) - (path[1] < -HSEP_QP_MOVES)) : 0.0;
+        hsep_differ(change, hsep_splines_sum(splines, hsep_at_const(self, self->c), count, k));
         total[k] = change[0] * splines->share[0];
         for (unsigned order = 1; order < HSEP_ORDERS; order++) {
             total[order * preview + k] = (path[order] + change[order]) * splines->share[order];
         }
+    }
+}
+
+HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    const hsep_int count = HSEP_N_DECIDED + splines->n, preview = splines->preview;
+    hsep_real *moves = hsep_at(self, self->moves), last = self->x_d_before[2];
+    planner_totals(self, x_d, count, preview, hsep_at(self, self->total), hsep_at(self, self->own));
+    for (hsep_int k = 0; k < preview; k++) {
+        const hsep_real step = x_d[k] - last;
+        moves[k] = self->no_reversal ? (hsep_real)((step > HSEP_QP_MOVES) - (step < -HSEP_QP_MOVES)) : 0.0;
+        last = x_d[k];
     }
 }
 
@@ -240,14 +255,8 @@ HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_re
     return bounded / (hsep_real)self->Np;
 }
 
-/* The first spline that this cost is of, and the triangle of its quadratic part. */
+/* The first spline that this cost is of. */
 static hsep_int planner_first(const hsep_planner *self) { return hsep_planner_splines(self)->n - self->solved.n; }
-
-static const hsep_real *planner_triangle(const hsep_planner *self)
-{
-    const hsep_int first = self->changes ? 0 : planner_first(self);
-    return hsep_at_const(self, self->P) + (first * hsep_planner_splines(self)->n - first * (first - 1) / 2);
-}
 
 /* Rows of splines x, (m,), of this cost. */
 static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows[])
@@ -309,7 +318,7 @@ HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], c
 static void planner_pin(hsep_planner *self)
 {
     const hsep_int n = hsep_planner_splines(self)->n, first = self->n_pinned;
-    const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED, *P = hsep_at(self, self->P);
+    const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED, *P = hsep_planner_quadratic(self);
     hsep_real *v = hsep_planner_linear(self);
     self->solved = hsep_knots_of(n - first, 0);
     for (hsep_int i = 0; i < first; i++) {
@@ -317,6 +326,7 @@ static void planner_pin(hsep_planner *self)
         P += n - i;
     }
     memmove(v, v + first, (size_t)(n - first) * sizeof(hsep_real));
+    memmove(hsep_planner_quadratic(self), P, (size_t)hsep_triangle(n - first) * sizeof(hsep_real));
 }
 
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
@@ -375,7 +385,7 @@ static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_toleran
         high[r] = most - other - tolerance->margin;
     }
     hsep_interior_begin(
-        hsep_part(self, self->interior), splines, &self->solved, planner_triangle(self), cost, tolerance);
+        hsep_part(self, self->interior), splines, &self->solved, hsep_planner_quadratic(self), cost, tolerance);
 }
 
 /* Change the remainder of the last plan by a step x, (m,), m, of this cost. */
@@ -389,7 +399,7 @@ static void planner_take(hsep_planner *self, const hsep_real x[])
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance)
 {
     const hsep_int n = self->solved.m;
-    const hsep_real *row = planner_triangle(self);
+    const hsep_real *row = hsep_planner_quadratic(self);
     const hsep_problem problem = hsep_planner_problem(self);
     hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low, *start = problem.high; /* work */
     hsep_real *factor = hsep_at(self, self->factor);
@@ -431,7 +441,8 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tole
 
 HSEP_API int hsep_planner_advance(hsep_planner *self)
 {
-    if (!hsep_interior_advance(hsep_part(self, self->interior), hsep_planner_splines(self), planner_triangle(self))) {
+    const hsep_splines *splines = hsep_planner_splines(self);
+    if (!hsep_interior_advance(hsep_part(self, self->interior), splines, hsep_planner_quadratic(self))) {
         return 0;
     }
     const hsep_problem problem = hsep_planner_problem(self);
@@ -485,30 +496,19 @@ static void stop_rows(const hsep_stop *self, const hsep_splines *splines, const 
 /* Bounds of the rows of a change: what limits and command leave, and the last stop at least. */
 static void stop_bounds(hsep_stop *self, const hsep_planner *planner, const hsep_real x_d[])
 {
-    const hsep_splines *splines = hsep_planner_splines(planner);
-    const hsep_int preview = self->preview;
     const hsep_real most = 1.0 - HSEP_QP_ROUNDING, *start = hsep_at(self, self->start);
     hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
-    hsep_real path[HSEP_ORDERS], change[HSEP_ORDERS];
-    hsep_splines_exceeded(splines, x_d, planner->x_d_before, preview, low);
-    hsep_differ_from(path, planner->x_d_before);
-    hsep_differ_from(change, planner->delta_before);
-    for (hsep_int k = 0; k < preview; k++) {
-        hsep_differ(path, x_d[k]);
-        hsep_differ(change, 0.0);
-        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-            const hsep_int r = order * preview + k;
-            const hsep_real of_x_d = order > 0 ? path[order] : 0.0, exceeded = order > 0 ? low[r] : 0.0;
-            const hsep_real offset = (change[order] + of_x_d) * splines->share[order];
-            low[r] = hsep_fmin((hsep_fmin(exceeded, 0.0) - most) - offset, start[r]) - HSEP_QP_ROUNDING;
-            high[r] = hsep_fmax((hsep_fmax(exceeded, 0.0) + most) - offset, start[r]) + HSEP_QP_ROUNDING;
-        }
+    planner_totals(planner, x_d, 0, self->preview, high, low);
+    for (hsep_int r = 0; r < HSEP_ORDERS * self->preview; r++) {
+        const hsep_real without = high[r], exceeded = low[r];
+        low[r] = hsep_fmin((hsep_fmin(exceeded, 0.0) - most) - without, start[r]) - HSEP_QP_ROUNDING;
+        high[r] = hsep_fmax((hsep_fmax(exceeded, 0.0) + most) - without, start[r]) + HSEP_QP_ROUNDING;
     }
 }
 
-/* Find the share of the last stop's own part, nearest 0, with which all rows keep their bounds, so far on the way to
- * the stop of the plan; return whether there is one. */
-static int stop_share(const hsep_stop *self, hsep_real length, hsep_real *share)
+/* Share of the last stop's own part, nearest 0, with which all rows keep their bounds, so far on the way to the stop of
+ * the plan; NaN: there is none. */
+static hsep_real stop_share(const hsep_stop *self, hsep_real length)
 {
     const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);
     const hsep_real *start = hsep_at_const(self, self->start), *way = hsep_at_const(self, self->way);
@@ -521,11 +521,10 @@ static int stop_share(const hsep_stop *self, hsep_real length, hsep_real *share)
             least = hsep_fmax(least, hsep_fmin(a, b));
             most = hsep_fmin(most, hsep_fmax(a, b));
         } else if (!(row >= low[r] && row <= high[r])) {
-            return 0;
+            return (hsep_real)NAN;
         }
     }
-    *share = hsep_fmin(hsep_fmax(0.0, least), most);
-    return least <= most;
+    return least <= most ? hsep_fmin(hsep_fmax(0.0, least), most) : (hsep_real)NAN;
 }
 
 HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self)
@@ -546,8 +545,8 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     const size_t shared = (size_t)first * sizeof(hsep_real);
     hsep_real *last = hsep_at(self, self->last), *own = hsep_at(self, self->own), *now = hsep_at(self, self->now);
     hsep_real *start = hsep_at(self, self->start), *way = hsep_at(self, self->way);
-    hsep_real *own_rows = hsep_at(self, self->own_rows), length = 0.0, share = 1.0, too_long = 1.0, tried = 1.0,
-              most = 0.0;
+    hsep_real *own_rows = hsep_at(self, self->own_rows), most = 0.0;
+    hsep_real length = 0.0, share = 1.0, too_long = 1.0, tried = 1.0;
     memcpy(own, last, shared);
     stop_behind(self, own);
     for (hsep_int i = 0; i < self->count; i++) {
@@ -568,12 +567,12 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
         memset(own_rows, 0, (size_t)rows * sizeof(hsep_real));
     }
     for (int tries = 0; tries < HSEP_STOP_TRIES && length < 1.0; tries++) { /* convex, with the last stop in it */
-        hsep_real found = 0.0;
-        if (stop_share(self, tried, &found)) {
+        const hsep_real found = stop_share(self, tried);
+        if (isnan(found)) {
+            too_long = tried;
+        } else {
             length = tried;
             share = found;
-        } else {
-            too_long = tried;
         }
         tried = 0.5 * (length + too_long);
     }

@@ -66,19 +66,16 @@ static void splines_change(const hsep_splines *self, const hsep_real c[], hsep_i
     memset(delta, 0, (size_t)k * sizeof(hsep_real));
     for (hsep_int place = 0; k < self->preview; place++) { /* between two knots */
         const hsep_int end = k + spacing < self->preview ? k + spacing : self->preview;
+        hsep_int within = 0;
         if (place >= HSEP_N_DECIDED && place < count) {
             const hsep_real c0 = c[place], c1 = c[place - 1], c2 = c[place - 2], c3 = c[place - 3];
-            const hsep_real *b0 = b, *b1 = b0 + spacing, *b2 = b1 + spacing, *b3 = b2 + spacing;
-            for (; k + HSEP_LANES <= end; k += HSEP_LANES) {
+            for (; k + HSEP_LANES <= end; k += HSEP_LANES, within += HSEP_LANES) {
+                const hsep_real *b0 = b + within, *b1 = b0 + spacing, *b2 = b1 + spacing, *b3 = b2 + spacing;
                 const hsep_lanes sum = c0 * *hsep_lanes_const(b0) + c1 * *hsep_lanes_const(b1);
                 *hsep_lanes_at(delta + k) = (sum + c2 * *hsep_lanes_const(b2)) + c3 * *hsep_lanes_const(b3);
-                b0 += HSEP_LANES, b1 += HSEP_LANES, b2 += HSEP_LANES, b3 += HSEP_LANES;
-            }
-            for (; k < end; k++) {
-                delta[k] = ((c0 * *b0++ + c1 * *b1++) + c2 * *b2++) + c3 * *b3++;
             }
         }
-        for (hsep_int within = 0; k < end; k++, within++) { /* not all four are there */
+        for (; k < end; k++, within++) { /* not all four are there, or no vector is left */
             delta[k] = 0.0;
             for (hsep_int i = 0; i <= HSEP_N_DECIDED && i <= place; i++) {
                 if (place - i < count) {
@@ -116,6 +113,7 @@ HSEP_API void hsep_splines_exceeded(
 {
     const hsep_int near = 4 * self->spacing;
     hsep_real now[HSEP_ORDERS];
+    memset(rows, 0, (size_t)count * sizeof(hsep_real));
     hsep_differ_from(now, before);
     for (hsep_int k = 0; k < count; k++) {
         hsep_differ(now, x_d[k]);
@@ -277,7 +275,7 @@ static const hsep_int knots_lengths[HSEP_KNOTS_LEVELS] = {1, 5, 13}, knots_place
 HSEP_API hsep_knots hsep_knots_of(hsep_int n, hsep_int window)
 {
     const hsep_int wide = window > 4 ? window : 4;
-    hsep_knots knots = {.n = n, .end = n, .m = n, .count = {n}};
+    hsep_knots knots = {.n = n, .count = {n}};
     hsep_int begin = 0;
     for (int level = 0; window > 0 && level < HSEP_KNOTS_LEVELS; level++) {
         const hsep_int apart = (hsep_int)1 << level, end = level < HSEP_KNOTS_LEVELS - 1 ? 2 * apart * wide : n;
@@ -287,11 +285,8 @@ HSEP_API hsep_knots hsep_knots_of(hsep_int n, hsep_int window)
         begin -= 4 * apart; /* the next ones overlap */
     }
     knots.m = knots.count[0] + knots.count[1] + knots.count[2];
-    knots.end = 0;
-    for (hsep_int i = 0; i < knots.m; i++) {
-        const hsep_knot knot = hsep_knots_at(&knots, i);
-        knots.end = knot.begin + knot.length > knots.end ? knot.begin + knot.length : knots.end;
-    }
+    const hsep_knot last = hsep_knots_at(&knots, knots.m - 1);
+    knots.end = last.begin + last.length;
     return knots;
 }
 
