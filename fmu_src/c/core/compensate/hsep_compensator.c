@@ -19,7 +19,7 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_c
     self->planner = hsep_take_block(&end, hsep_planner_lay_out(&(hsep_planner){0}, parameters));
     self->predictor = hsep_take_block(&end, hsep_predictor_lay_out(&(hsep_predictor){0}, predictor));
     if (predictor->averaging.averaging) {
-        self->averaged = hsep_take_block(&end, hsep_averaged_planner_lay_out(&(hsep_averaged_planner){0}, parameters));
+        self->averaged = hsep_take_block(&end, hsep_newton_lay_out(&(hsep_newton){0}, parameters));
     }
     return end * sizeof(hsep_real);
 }
@@ -53,7 +53,7 @@ HSEP_API void hsep_compensator_block_init(
         spline[k] = hsep_physics_respond(trial, k < 4 * splines->spacing ? hsep_splines_shape(splines)[k] : 0.0);
     }
     if (self->averaged) {
-        hsep_averaged_planner_init(hsep_compensator_averaged(self), parameters, hsep_compensator_planner(self), spline);
+        hsep_newton_init(hsep_compensator_newton(self), parameters, hsep_compensator_planner(self), spline);
     }
 }
 
@@ -62,10 +62,10 @@ static hsep_int compensator_horizon(const hsep_compensator *self)
     return hsep_planner_splines(hsep_part_const(self, self->planner))->preview;
 }
 
-static hsep_averaged_task compensator_task(hsep_compensator *self)
+static hsep_newton_task compensator_task(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
-    return (hsep_averaged_task){
+    return (hsep_newton_task){
         .predictor = predictor,
         .model = hsep_predictor_averaged(predictor),
         .planner = hsep_compensator_planner(self),
@@ -172,7 +172,7 @@ static void compensator_publish(hsep_compensator *self, hsep_int last)
         predictor->divergence = HSEP_DIVERGES_X_DM;
     }
     if (self->averaged) { /* the window's part of the preview, and what is late before it */
-        const hsep_averaged_planner *averaged = hsep_compensator_averaged(self);
+        const hsep_newton *averaged = hsep_compensator_newton(self);
         memcpy(
             hsep_at(predictor, predictor->e_h), hsep_at_const(averaged, averaged->e_h) + (averaged->preview - Np),
             (size_t)predictor->n * sizeof(hsep_real));
@@ -191,9 +191,9 @@ static void compensator_solve(hsep_compensator *self)
     const hsep_int left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
     int done = 0;
     if (self->averaged) {
-        const hsep_averaged_task task = compensator_task(self);
-        done = hsep_averaged_planner_run(hsep_compensator_averaged(self), &task, left);
-        self->state = done ? hsep_compensator_averaged(self)->planned : self->state;
+        const hsep_newton_task task = compensator_task(self);
+        done = hsep_newton_run(hsep_compensator_newton(self), &task, left);
+        self->state = done ? hsep_compensator_newton(self)->planned : self->state;
     } else { /* parts of the solver's steps, all that are left of them in the last sample */
         const hsep_int due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
         for (hsep_int part = 0; !done && part < due; part++) {
@@ -286,10 +286,10 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
         x_d[k] = x_d[last] + (x_d[last] - x_d[last - 1]) * (hsep_real)(k - last);
     }
     if (self->averaged) { /* which model planned is known when the plan is made */
-        const hsep_averaged_task task = compensator_task(self);
+        const hsep_newton_task task = compensator_task(self);
         self->before = self->state;
         predictor->n_physics = hsep_predictor_warm_up(predictor, 0);
-        hsep_averaged_planner_begin(hsep_compensator_averaged(self), &task, self->compensate);
+        hsep_newton_begin(hsep_compensator_newton(self), &task, self->compensate);
     }
     const int solving = self->averaged || compensator_plan(self);
     if (!solving) {

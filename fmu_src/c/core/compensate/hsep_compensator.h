@@ -3,7 +3,7 @@
  *
  * A window is planned in the sample in which it is predicted. A plan that the drive's limits bound is solved over the
  * samples that follow, while the command follows the last plan. With averaging every plan is solved so, over
- * HSEP_PLANNING_PINNED_AVERAGED samples (hsep_averaged_planner_run).
+ * HSEP_PLANNING_PINNED_AVERAGED samples (hsep_newton_run).
  *
  * Cost of a sample, with n features and m splines in a plan: as much as hsep_regression_fold(n). The end of a window
  * costs on top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two terms
@@ -20,7 +20,7 @@
 #include "hsep.h"
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
-#include "hsep_averaged_planner.h"
+#include "hsep_newton.h"
 
 /* Samples in a row above the largest following error that trip: one or two may be outliers of the sensor. Missing ones
  * do not count. */
@@ -67,10 +67,7 @@ static inline hsep_predictor *hsep_compensator_predictor(hsep_compensator *self)
     return hsep_part(self, self->predictor);
 }
 static inline hsep_planner *hsep_compensator_planner(hsep_compensator *self) { return hsep_part(self, self->planner); }
-static inline hsep_averaged_planner *hsep_compensator_averaged(hsep_compensator *self)
-{
-    return hsep_part(self, self->averaged);
-}
+static inline hsep_newton *hsep_compensator_newton(hsep_compensator *self) { return hsep_part(self, self->averaged); }
 
 /* Plan the first window. */
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);

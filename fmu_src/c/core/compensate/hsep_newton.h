@@ -9,11 +9,11 @@
  * remainder then, and is followed where compensation is off.
  *
  * A plan is one function in reading order, cut by yields into short parts, each of which says what it costs;
- * hsep_averaged_planner_run does as many as a sample's equal share of the work that may be left. A block as
+ * hsep_newton_run does as many as a sample's equal share of the work that may be left. A block as
  * hsep_layout.h has them.
  */
-#ifndef HSEP_AVERAGED_PLANNER_H
-#define HSEP_AVERAGED_PLANNER_H
+#ifndef HSEP_NEWTON_H
+#define HSEP_NEWTON_H
 
 #include "hsep_linearised.h"
 #include "hsep_physics.h"
@@ -21,11 +21,11 @@
 #include "hsep_predictor.h"
 #include "hsep_averaged_model.h"
 
-#define HSEP_AVERAGED_TRIES 2    /* lengths of the last Newton step that are tried, */
-#define HSEP_AVERAGED_VARIED 4   /* variances that are computed in a part, */
-#define HSEP_AVERAGED_PRODUCTS 8 /* rows of a programme that are */
-#define HSEP_AVERAGED_SHAPES 28  /* spacings of splines with knots 1, 2 and 4 of them apart: 4 each time */
-#define HSEP_AVERAGED_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
+#define HSEP_NEWTON_TRIES 2    /* lengths of the last Newton step that are tried, */
+#define HSEP_NEWTON_VARIED 4   /* variances that are computed in a part, */
+#define HSEP_NEWTON_PRODUCTS 8 /* rows of a programme that are */
+#define HSEP_NEWTON_SHAPES 28  /* spacings of splines with knots 1, 2 and 4 of them apart: 4 each time */
+#define HSEP_NEWTON_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
 
 typedef struct {
     hsep_int preview, Np;
@@ -65,15 +65,15 @@ typedef struct {
     hsep_int weight;     /* (preview,) of the errors of a plan: they count less at its end */
     hsep_int corrected;  /* (n,) m, what the averaged model's last plan changed the one before by; 0 of any other */
     hsep_int begins;     /* (m,) hsep_int, samples that the splines begin with, which are solved for */
-    hsep_int shapes;     /* (HSEP_AVERAGED_SHAPES spacing,) splines of each distance of knots, one after the other, */
+    hsep_int shapes;     /* (HSEP_NEWTON_SHAPES spacing,) splines of each distance of knots, one after the other, */
     hsep_int passed;     /* (HSEP_KNOTS_LEVELS, preview) and these behind G_pb */
     hsep_int gram;       /* triangle of m rows, W' W with G_pb alone */
     hsep_int W;          /* (m, preview) weighted changes of x_h by splines, 0 before they begin */
     hsep_int linearised;
     hsep_int physics; /* G_pb at the beginning of the window, */
     hsep_int trial;   /* and for a trial */
-} hsep_averaged_planner;
-HSEP_ASSERT_WORDS(hsep_averaged_planner, 45);
+} hsep_newton;
+HSEP_ASSERT_WORDS(hsep_newton, 45);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
@@ -82,22 +82,20 @@ typedef struct {
     hsep_planner *planner;
     const hsep_real *x_d;  /* (preview,) m, commanded positions, */
     const hsep_real *load; /* (preview,) m, and what the drive's load adds to them */
-} hsep_averaged_task;
+} hsep_newton_task;
 
-HSEP_API hsep_real
-hsep_averaged_planner_lay_out(hsep_averaged_planner *self, const hsep_compensator_parameters *parameters);
+HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_compensator_parameters *parameters);
 
 /* Fill the block, which is 0, with the planner that solves its plans and a spline filtered by the physics model,
  * (preview,), m/m. Cost: m^2 preview / 4 multiply-adds. */
-HSEP_API void hsep_averaged_planner_init(
-    hsep_averaged_planner *self, const hsep_compensator_parameters *parameters, hsep_planner *plans,
-    const hsep_real spline[]);
+HSEP_API void hsep_newton_init(
+    hsep_newton *self, const hsep_compensator_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
  * averaged, which judges plans once the warm-up is over. It predicts only the samples
  * that the plan leaves as they are, and the late ones before them. Cost: as hsep_averaged_forecast; a late
  * measurement adds late^2 / 2 multiply-adds for each expert, here and in the last part, for variances. */
-HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best);
+HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best);
 
 /* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that is left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
@@ -108,6 +106,6 @@ HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hse
  * compensation, which has all splines that are not pinned; a second length of a Newton step, rarely tried, adds
  * a prediction to the last sample. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all (f + 60)
  * for each expert, and 700 all. */
-HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples);
+HSEP_API int hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples);
 
 #endif

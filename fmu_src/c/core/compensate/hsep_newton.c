@@ -1,14 +1,13 @@
-#include "hsep_averaged_planner.h"
+#include "hsep_newton.h"
 
 #include "hsep_cholesky.h"
 
-static const hsep_real averaged_planner_lengths[] = {HSEP_NEWTON_LENGTHS};
-static const hsep_tolerance averaged_planner_tolerance = {HSEP_NEWTON_TOLERANCE};
+static const hsep_real newton_lengths[] = {HSEP_NEWTON_LENGTHS};
+static const hsep_tolerance newton_tolerance = {HSEP_NEWTON_TOLERANCE};
 
-HSEP_ASSERT(lengths, sizeof averaged_planner_lengths == HSEP_AVERAGED_TRIES * sizeof(hsep_real));
+HSEP_ASSERT(lengths, sizeof newton_lengths == HSEP_NEWTON_TRIES * sizeof(hsep_real));
 
-HSEP_API hsep_real
-hsep_averaged_planner_lay_out(hsep_averaged_planner *self, const hsep_compensator_parameters *parameters)
+HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_compensator_parameters *parameters)
 {
     const hsep_predictor_parameters *predictor = &parameters->predictor;
     const hsep_knots knots = hsep_planner_knots(parameters);
@@ -16,7 +15,7 @@ hsep_averaged_planner_lay_out(hsep_averaged_planner *self, const hsep_compensato
     const hsep_real all = (hsep_real)hsep_predicted(predictor), preview = (hsep_real)predictor->horizon;
     const hsep_real filter = hsep_physics_lay_out(&(hsep_physics){0}, predictor), m = (hsep_real)knots.m;
     const hsep_real coefficients = HSEP_N_DECIDED + (hsep_real)n;
-    hsep_real end = HSEP_WORDS(hsep_averaged_planner);
+    hsep_real end = HSEP_WORDS(hsep_newton);
     self->preview = predictor->horizon;
     self->late = hsep_late(&predictor->settings);
     self->Np = predictor->settings.Np;
@@ -34,7 +33,7 @@ hsep_averaged_planner_lay_out(hsep_averaged_planner *self, const hsep_compensato
     self->weight = hsep_take(&end, preview);
     self->corrected = hsep_take(&end, (hsep_real)n);
     self->begins = hsep_take(&end, m);
-    self->shapes = hsep_take(&end, HSEP_AVERAGED_SHAPES * (hsep_real)spacing);
+    self->shapes = hsep_take(&end, HSEP_NEWTON_SHAPES * (hsep_real)spacing);
     self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
     self->gram = hsep_take(&end, hsep_triangle(knots.m));
     self->W = hsep_take(&end, m * preview);
@@ -45,19 +44,15 @@ hsep_averaged_planner_lay_out(hsep_averaged_planner *self, const hsep_compensato
 }
 
 /* Whether a plan costs less than another; not if it is NaN. */
-static int averaged_planner_better(hsep_real cost, hsep_real other)
-{
-    return cost < (1.0 - HSEP_NEWTON_LEAST_GAIN) * other;
-}
+static int newton_better(hsep_real cost, hsep_real other) { return cost < (1.0 - HSEP_NEWTON_LEAST_GAIN) * other; }
 
-static void averaged_planner_copy(hsep_averaged_planner *self, hsep_real to[], const hsep_real from[])
+static void newton_copy(hsep_newton *self, hsep_real to[], const hsep_real from[])
 {
     memcpy(to, from, (size_t)(HSEP_N_DECIDED + self->n) * sizeof(hsep_real));
 }
 
 /* Commands under the first count coefficients of a plan, and the response of the physics model to them. */
-static void averaged_planner_command(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[], hsep_int count)
+static void newton_command(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[], hsep_int count)
 {
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
@@ -72,11 +67,11 @@ static void averaged_planner_command(
 
 /* Whether the unmodified commands, and the physics model behind them, outgrow what is learned by HSEP_PLANNING_FASTER:
  * in their largest change from sample to sample over the plan and the late samples. */
-static int averaged_planner_outgrows(hsep_averaged_planner *self, const hsep_averaged_task *task)
+static int newton_outgrows(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
     hsep_real of_command = 0.0, of_model = 0.0;
-    averaged_planner_command(self, task, hsep_at(self, self->rest), 0);
+    newton_command(self, task, hsep_at(self, self->rest), 0);
     for (hsep_int j = 1; j < self->preview + self->late; j++) {
         of_command = hsep_fmax(of_command, hsep_fabs(command[j - 1] - command[j]));
         of_model = hsep_fmax(of_model, hsep_fabs(x_pb[j - 1] - x_pb[j]));
@@ -85,7 +80,7 @@ static int averaged_planner_outgrows(hsep_averaged_planner *self, const hsep_ave
 }
 
 /* target := weighted x_d - x_h of the plan that was predicted last, m; return the sum of their squares. */
-static hsep_real averaged_planner_errors(hsep_averaged_planner *self, const hsep_averaged_task *task)
+static hsep_real newton_errors(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     const hsep_real *weight = hsep_at(self, self->weight);
@@ -99,14 +94,14 @@ static hsep_real averaged_planner_errors(hsep_averaged_planner *self, const hsep
 }
 
 /* Cost of the plan that was predicted last, m2; not finite if the prediction overflows. */
-static hsep_real averaged_planner_cost(hsep_averaged_planner *self, const hsep_averaged_task *task, const hsep_real c[])
+static hsep_real newton_cost(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[])
 {
-    const hsep_real error = averaged_planner_errors(self, task);
+    const hsep_real error = newton_errors(self, task);
     return error + hsep_planner_jerk(task->planner, c, hsep_at(self, self->target));
 }
 
 /* Variance of the plan that was predicted last with variances, over all of it, weighted as its errors, m2. */
-static hsep_real averaged_planner_doubt(hsep_averaged_planner *self, const hsep_averaged_task *task)
+static hsep_real newton_doubt(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real *weight = hsep_at(self, self->weight);
     const hsep_real *variance = hsep_at_const(task->model, task->model->variance);
@@ -118,11 +113,10 @@ static hsep_real averaged_planner_doubt(hsep_averaged_planner *self, const hsep_
 }
 
 /* Samples that the splines begin with, which are solved for. */
-static hsep_int *averaged_planner_begins(hsep_averaged_planner *self) { return hsep_part(self, self->begins); }
+static hsep_int *newton_begins(hsep_newton *self) { return hsep_part(self, self->begins); }
 
 /* A spline with this distance of knots. */
-static hsep_linearised_change averaged_planner_shape(
-    hsep_averaged_planner *self, const hsep_planner *planner, hsep_int level)
+static hsep_linearised_change newton_shape(hsep_newton *self, const hsep_planner *planner, hsep_int level)
 {
     const hsep_int width = 4 * hsep_planner_splines(planner)->spacing;
     return (hsep_linearised_change){
@@ -133,7 +127,7 @@ static hsep_linearised_change averaged_planner_shape(
 
 /* Begin the physics model's plan at the remainder of the last one, which was predicted last: W' W, and W' times the
  * weighted error. */
-static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averaged_task *task)
+static void newton_open(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *weight = hsep_at(self, self->weight);
     hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
@@ -146,8 +140,8 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
         target[k] = weight[k] * weight[k] * (task->x_d[k] - task->predictor->start - x_pb[self->preview - 1 - k]);
     }
     for (hsep_int i = 0; i < self->m; i++) {
-        const hsep_int level = hsep_knots_at(&task->planner->knots, i).level, begin = averaged_planner_begins(self)[i];
-        const hsep_real *passed = averaged_planner_shape(self, task->planner, level).passed;
+        const hsep_int level = hsep_knots_at(&task->planner->knots, i).level, begin = newton_begins(self)[i];
+        const hsep_real *passed = newton_shape(self, task->planner, level).passed;
         v[i] = hsep_dot(passed, target + begin, self->preview - begin);
     }
     memcpy(
@@ -157,24 +151,24 @@ static void averaged_planner_open(hsep_averaged_planner *self, const hsep_averag
 }
 
 /* Splines, from one on, whose changes of x_h are computed side by side: they have the same distance of knots. */
-static hsep_int averaged_planner_together(const hsep_planner *planner, hsep_int first)
+static hsep_int newton_together(const hsep_planner *planner, hsep_int first)
 {
     const hsep_int left = hsep_knots_at(&planner->knots, first).last + 1 - first;
     return left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
 }
 
 /* Weighted changes of x_h by the next splines; the first of a distance of knots begins the linearisation. */
-static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_averaged_task *task)
+static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
 {
-    const hsep_int first = self->spline, count = averaged_planner_together(task->planner, first);
+    const hsep_int first = self->spline, count = newton_together(task->planner, first);
     const hsep_int spacing = hsep_planner_splines(task->planner)->spacing;
     const hsep_real *weight = hsep_at(self, self->weight);
     hsep_linearised *linearised = hsep_part(self, self->linearised);
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL};
     const hsep_knot knot = hsep_knots_at(&task->planner->knots, first);
-    const hsep_int apart = spacing << knot.level, from = averaged_planner_begins(self)[first];
+    const hsep_int apart = spacing << knot.level, from = newton_begins(self)[first];
     if (first == knot.first) {
-        const hsep_linearised_change change = averaged_planner_shape(self, task->planner, knot.level);
+        const hsep_linearised_change change = newton_shape(self, task->planner, knot.level);
         hsep_linearised_begin(linearised, task->model, &change);
     }
     for (hsep_int c = 0; c < count; c++) {
@@ -191,12 +185,12 @@ static void averaged_planner_columns(hsep_averaged_planner *self, const hsep_ave
 }
 
 /* Some rows of the programme of a Newton step, P = W' W, and of its linear term. */
-static void averaged_planner_products(hsep_averaged_planner *self, hsep_planner *planner)
+static void newton_products(hsep_newton *self, hsep_planner *planner)
 {
     const hsep_int m = self->m, preview = self->preview, first = self->spline;
-    const hsep_int end = first + HSEP_AVERAGED_PRODUCTS < m ? first + HSEP_AVERAGED_PRODUCTS : m;
+    const hsep_int end = first + HSEP_NEWTON_PRODUCTS < m ? first + HSEP_NEWTON_PRODUCTS : m;
     const hsep_real *W = hsep_at(self, self->W), *target = hsep_at(self, self->target);
-    const hsep_int *begins = averaged_planner_begins(self);
+    const hsep_int *begins = newton_begins(self);
     hsep_real *v = hsep_planner_linear(planner);
     hsep_real *P = hsep_planner_quadratic(planner) + (first * m - first * (first - 1) / 2);
     for (hsep_int i = first; i < end; i++) {
@@ -224,7 +218,7 @@ static void averaged_planner_products(hsep_averaged_planner *self, hsep_planner 
 }
 
 /* Splines of each distance of knots, and what they give with the physics model alone. */
-static void averaged_planner_shape_all(hsep_averaged_planner *self, hsep_planner *plans, const hsep_real spline[])
+static void newton_shape_all(hsep_newton *self, hsep_planner *plans, const hsep_real spline[])
 {
     const hsep_splines *splines = hsep_planner_splines(plans);
     const hsep_int spacing = splines->spacing, preview = self->preview;
@@ -232,8 +226,8 @@ static void averaged_planner_shape_all(hsep_averaged_planner *self, hsep_planner
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_knot knot = hsep_knots_at(&plans->knots, i);
         const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
-        const hsep_linearised_change change = averaged_planner_shape(self, plans, knot.level);
-        averaged_planner_begins(self)[i] = begin;
+        const hsep_linearised_change change = newton_shape(self, plans, knot.level);
+        newton_begins(self)[i] = begin;
         memset(change.commands, 0, (size_t)change.n * sizeof(hsep_real));
         memset(change.passed, 0, (size_t)preview * sizeof(hsep_real));
         for (hsep_int j = 0; j < knot.length; j++) {
@@ -247,17 +241,16 @@ static void averaged_planner_shape_all(hsep_averaged_planner *self, hsep_planner
         }
     }
     while (self->spline < self->m) {
-        averaged_planner_products(self, plans);
+        newton_products(self, plans);
     }
     memcpy(
         hsep_at(self, self->gram), hsep_planner_quadratic(plans), (size_t)hsep_triangle(self->m) * sizeof(hsep_real));
 }
 
-HSEP_API void hsep_averaged_planner_init(
-    hsep_averaged_planner *self, const hsep_compensator_parameters *parameters, hsep_planner *plans,
-    const hsep_real spline[])
+HSEP_API void hsep_newton_init(
+    hsep_newton *self, const hsep_compensator_parameters *parameters, hsep_planner *plans, const hsep_real spline[])
 {
-    (void)hsep_averaged_planner_lay_out(self, parameters);
+    (void)hsep_newton_lay_out(self, parameters);
     const hsep_real window = (hsep_real)self->Np * parameters->predictor.settings.T_s; /* s */
     self->pause = (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / window + 0.5);
     self->share = 1.0;
@@ -269,20 +262,20 @@ HSEP_API void hsep_averaged_planner_init(
         const hsep_real left = (hsep_real)(self->preview - k) / (hsep_real)(falling + 1);
         weight[k] = k < begin ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
     }
-    averaged_planner_shape_all(self, plans, spline);
+    newton_shape_all(self, plans, spline);
 }
 
 /* Steps of the solver for the physics model's plan, and for a Newton step. */
-static hsep_int averaged_planner_physics_steps(const hsep_averaged_planner *self)
+static hsep_int newton_physics_steps(const hsep_newton *self)
 {
-    return self->follows ? HSEP_NEWTON_PHYSICS_STEPS : averaged_planner_tolerance.steps;
+    return self->follows ? HSEP_NEWTON_PHYSICS_STEPS : newton_tolerance.steps;
 }
 
 /* Do a part of the solution of a programme in so many steps: its factor and what its bounds allow, then the solver's.
  */
-static void averaged_planner_solve(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int steps)
+static void newton_solve(hsep_newton *self, const hsep_newton_task *task, hsep_int steps)
 {
-    hsep_tolerance tolerance = averaged_planner_tolerance;
+    hsep_tolerance tolerance = newton_tolerance;
     tolerance.steps = steps;
 #ifdef HSEP_FLOAT32
     tolerance.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
@@ -294,7 +287,7 @@ static void averaged_planner_solve(hsep_averaged_planner *self, const hsep_avera
 
 /* Half of the change of velocity that the slope of the next Newton step is taken over: a share of what this one changes
  * the best plan, or would, RMS, relative to the model's scale. */
-static hsep_real averaged_planner_next_reach(hsep_averaged_planner *self, const hsep_averaged_task *task)
+static hsep_real newton_next_reach(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
     const hsep_real scale = task->model->forecast_scale * hsep_averaged_disturbances(task->model)->T_s;
@@ -314,18 +307,18 @@ static hsep_real averaged_planner_next_reach(hsep_averaged_planner *self, const 
 
 /* Judge a length of a step, whose end the planner has, and take it if it is better; otherwise a shorter one is tried.
  */
-static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_averaged_task *task)
+static void newton_judge(hsep_newton *self, const hsep_newton_task *task)
 {
     hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
-    const hsep_real cost = averaged_planner_cost(self, task, c);
+    const hsep_real cost = newton_cost(self, task, c);
     self->tries++;
-    if (averaged_planner_better(cost, self->cost)) {
+    if (newton_better(cost, self->cost)) {
         self->gains = 1;
-        self->tries = HSEP_AVERAGED_TRIES;
+        self->tries = HSEP_NEWTON_TRIES;
         self->cost = cost;
-        averaged_planner_copy(self, best, c);
-    } else if (self->tries < HSEP_AVERAGED_TRIES) {
-        const hsep_real shorter = averaged_planner_lengths[self->tries] / averaged_planner_lengths[self->tries - 1];
+        newton_copy(self, best, c);
+    } else if (self->tries < HSEP_NEWTON_TRIES) {
+        const hsep_real shorter = newton_lengths[self->tries] / newton_lengths[self->tries - 1];
         for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
             c[j] = best[j] + shorter * (c[j] - best[j]);
         }
@@ -335,7 +328,7 @@ static void averaged_planner_judge(hsep_averaged_planner *self, const hsep_avera
 /* Whether the best plan asks for a larger change than compensation is made for. A motor at its limit does not follow,
  * so that the next plan asks for more. A position loop that is driven so far may fall into a second state with an error
  * many times larger, and stays in it when compensation ends. */
-static int averaged_planner_runs_away(const hsep_averaged_planner *self, const hsep_averaged_task *task)
+static int newton_runs_away(const hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real share = hsep_planner_splines(task->planner)->share[0];
     const hsep_real error = hsep_sqrt(self->cost / (hsep_real)self->preview) * share;
@@ -345,7 +338,7 @@ static int averaged_planner_runs_away(const hsep_averaged_planner *self, const h
 }
 
 /* Forget what the last plan changed but for what is in its remainder, which this plan may change. */
-static void averaged_planner_shift(hsep_averaged_planner *self, hsep_int kept)
+static void newton_shift(hsep_newton *self, hsep_int kept)
 {
     hsep_real *corrected = hsep_at(self, self->corrected);
     const hsep_int left = self->follows ? self->n - kept : 0;
@@ -355,7 +348,7 @@ static void averaged_planner_shift(hsep_averaged_planner *self, hsep_int kept)
 
 /* Take a share of what the best plan changes, smaller where it takes back what the last plan has changed, or gains
  * little beside the variance of its prediction. */
-static void averaged_planner_take(hsep_averaged_planner *self, const hsep_planner *planner)
+static void newton_take(hsep_newton *self, const hsep_planner *planner)
 {
     const hsep_int near = HSEP_PLANNING_NEAR * (self->Np / hsep_planner_splines(planner)->spacing);
     const hsep_int first = planner->n_pinned, end = near < self->n ? near : self->n;
@@ -383,18 +376,18 @@ static void averaged_planner_take(hsep_averaged_planner *self, const hsep_planne
 
 /* Take the plan whose cost is lowest, of the averaged model's change of the last one a share; the physics model's was
  * predicted last. */
-static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_averaged_task *task)
+static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
 {
-    const hsep_real of_physics = averaged_planner_cost(self, task, hsep_at(self, self->of_physics));
-    const int is_last = averaged_planner_better(self->cost_of_rest, of_physics);
+    const hsep_real of_physics = newton_cost(self, task, hsep_at(self, self->of_physics));
+    const int is_last = newton_better(self->cost_of_rest, of_physics);
     hsep_int plan = is_last ? self->rest : self->of_physics;
     self->planned = !is_last;
-    if (self->follows && averaged_planner_better(self->cost, of_physics)) {
-        if (averaged_planner_runs_away(self, task)) {
+    if (self->follows && newton_better(self->cost, of_physics)) {
+        if (newton_runs_away(self, task)) {
             self->paused = self->pause;
             self->pause *= 2;
         } else {
-            averaged_planner_take(self, task->planner);
+            newton_take(self, task->planner);
             plan = self->best;
             self->planned = 2;
         }
@@ -402,13 +395,13 @@ static void averaged_planner_compare(hsep_averaged_planner *self, const hsep_ave
     if (self->planned < 2) {
         memset(hsep_at(self, self->corrected), 0, (size_t)self->n * sizeof(hsep_real));
     }
-    averaged_planner_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
+    newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
 /* Work is counted in multiply-adds of loops over arrays. As so many counts a number that is computed apart, with
  * branches, divisions or loads for itself alone; and a sample of a mode. */
-#define AVERAGED_PLANNER_NUMBER 20.0
-#define AVERAGED_PLANNER_MODE 9.0
+#define NEWTON_NUMBER 20.0
+#define NEWTON_MODE 9.0
 
 /* Multiply-adds of the parts of a plan, counted from the sizes. */
 typedef struct {
@@ -422,34 +415,34 @@ typedef struct {
     hsep_real open;      /* a programme that is not of a Newton step, */
     hsep_real solve;     /* the factor of one, its bounds, and whether they allow its minimum, */
     hsep_real step;      /* and a part of a solver's step */
-} averaged_planner_work;
+} newton_work;
 
-static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planner *self, const hsep_averaged_task *task)
+static newton_work newton_work_of(const hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_physics *physics = hsep_part_const(self, self->physics);
     const hsep_real all = (hsep_real)(self->preview + self->late);
-    const hsep_real modes = AVERAGED_PLANNER_MODE * (hsep_real)physics->n_modes;
+    const hsep_real modes = NEWTON_MODE * (hsep_real)physics->n_modes;
     const hsep_real n = (hsep_real)(self->ends ? task->planner->knots.n : self->m), pairs = n * n;
-    averaged_planner_work work = {.number = AVERAGED_PLANNER_NUMBER * (hsep_real)self->preview, .column = 1.0};
-    hsep_real run = HSEP_N_EXPERTS * AVERAGED_PLANNER_NUMBER; /* the stack */
+    newton_work work = {.number = NEWTON_NUMBER * (hsep_real)self->preview, .column = 1.0};
+    hsep_real run = HSEP_N_EXPERTS * NEWTON_NUMBER; /* the stack */
     work.sample = run;
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         if (task->model->predicted[i]) {
             const hsep_expert *expert = hsep_averaged_expert(task->model, i);
             const hsep_real m = (hsep_real)(expert->p + expert->n_static);
-            run += m + 3.0 * AVERAGED_PLANNER_NUMBER;                     /* in free run, within bounds, shrunk */
-            work.sample += 2.0 * m + all + 3.0 * AVERAGED_PLANNER_NUMBER; /* with the variances before it */
-            work.row += 0.5 * m * (m + AVERAGED_PLANNER_NUMBER);
+            run += m + 3.0 * NEWTON_NUMBER;                     /* in free run, within bounds, shrunk */
+            work.sample += 2.0 * m + all + 3.0 * NEWTON_NUMBER; /* with the variances before it */
+            work.row += 0.5 * m * (m + NEWTON_NUMBER);
             if (hsep_averaged_kind_of(task->model, i) == HSEP_MODEL_RESIDUAL && task->model->shares[i] > 0.0) {
                 work.column += 0.7 * (hsep_real)expert->p + modes + 16.0 + HSEP_FEATURES_N_STOPS; /* early: less p */
             }
         }
     }
     /* tanh counts as two; change, command, x_pb, velocity, two of the position; what is filtered */
-    work.commands = all * AVERAGED_PLANNER_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
+    work.commands = all * NEWTON_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
                     all * modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
     work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
-    work.linearise = all * AVERAGED_PLANNER_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 14.0);
+    work.linearise = all * NEWTON_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 14.0);
     work.open = 20.0 * work.number + 5.0 * pairs;
     /* row, bound, slack, multiplier of each order */
     work.solve = 5.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.5);
@@ -458,39 +451,38 @@ static averaged_planner_work averaged_planner_work_of(const hsep_averaged_planne
 }
 
 /* Products of the columns of some splines with all behind them. */
-static hsep_real averaged_planner_of_products(hsep_averaged_planner *self, hsep_int begin, hsep_int end)
+static hsep_real newton_of_products(hsep_newton *self, hsep_int begin, hsep_int end)
 {
     hsep_real sum = 0.0;
     for (hsep_int i = begin; i < end && i < self->m; i++) {
-        const hsep_int length = self->preview - averaged_planner_begins(self)[i];
-        sum += 0.7 * (hsep_real)(self->m - i) * ((hsep_real)length + AVERAGED_PLANNER_NUMBER);
+        const hsep_int length = self->preview - newton_begins(self)[i];
+        sum += 0.7 * (hsep_real)(self->m - i) * ((hsep_real)length + NEWTON_NUMBER);
     }
     return sum;
 }
 
 /* Columns from one on, with what begins the linearisation of a distance of knots. */
-static hsep_real averaged_planner_of_columns(
-    hsep_averaged_planner *self, const hsep_planner *planner, const averaged_planner_work *work, hsep_int first)
+static hsep_real newton_of_columns(
+    hsep_newton *self, const hsep_planner *planner, const newton_work *work, hsep_int first)
 {
-    const hsep_real length = (hsep_real)(self->preview - averaged_planner_begins(self)[first]);
+    const hsep_real length = (hsep_real)(self->preview - newton_begins(self)[first]);
     const int is_first = hsep_knots_at(&planner->knots, first).first == first;
     return HSEP_PHYSICS_ABREAST * length * work->column + (is_first ? 6.0 * work->number : 0.0);
 }
 
 /* Predict the next part of the samples under a plan: with its commands the first ones, then half of all each time; with
  * variances a few, one for each in the window. Return what it takes; without a plan it is counted only. */
-static hsep_real averaged_planner_predict(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work, const hsep_real c[],
-    int varies)
+static hsep_real newton_predict(
+    hsep_newton *self, const hsep_newton_task *task, const newton_work *work, const hsep_real c[], int varies)
 {
     const hsep_int first = self->samples, all = self->late + self->preview, window = self->late + self->Np;
     const hsep_int apart = !varies ? 0 : first < window ? 1 : HSEP_NEWTON_APART; /* as hsep_averaged_go_on has it */
     const hsep_int left = (apart == 1 ? window : all) - first;
-    const hsep_int most = varies ? apart * HSEP_AVERAGED_VARIED : first == 0 ? all / HSEP_AVERAGED_AT_FIRST : all / 2;
+    const hsep_int most = varies ? apart * HSEP_NEWTON_VARIED : first == 0 ? all / HSEP_NEWTON_AT_FIRST : all / 2;
     const hsep_int count = left < most ? left : most;
     hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     if (c != NULL && first == 0) {
-        averaged_planner_command(self, task, c, HSEP_N_DECIDED + self->n);
+        newton_command(self, task, c, HSEP_N_DECIDED + self->n);
         hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, count, apart);
     } else if (c != NULL) {
         hsep_averaged_go_on(task->model, x_pb, e_h, first, first + count, apart);
@@ -504,8 +496,7 @@ static hsep_real averaged_planner_predict(
 }
 
 /* The work that is left of a plan, nearly always at most, where it begins, or behind the Newton steps. */
-static hsep_real averaged_planner_left(
-    hsep_averaged_planner *self, const hsep_averaged_task *task, const averaged_planner_work *work)
+static hsep_real newton_left(hsep_newton *self, const hsep_newton_task *task, const newton_work *work)
 {
     const hsep_int window = self->late + self->Np, behind = self->preview - self->Np, first = self->samples;
     const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
@@ -520,26 +511,26 @@ static hsep_real averaged_planner_left(
                 (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
     }
     if (self->planned) {
-        left += work->open + work->solve + (hsep_real)averaged_planner_physics_steps(self) * parts;
+        left += work->open + work->solve + (hsep_real)newton_physics_steps(self) * parts;
     }
     if (self->ends) {
-        left += work->open + work->solve + 2.0 * work->predict + (hsep_real)averaged_planner_tolerance.steps * parts;
+        left += work->open + work->solve + 2.0 * work->predict + (hsep_real)newton_tolerance.steps * parts;
     }
     if (self->follows) {
-        hsep_real newton = work->linearise + averaged_planner_of_products(self, 0, self->m) + work->solve +
+        hsep_real newton = work->linearise + newton_of_products(self, 0, self->m) + work->solve +
                            3.0 * work->predict; /* one length of it is enough nearly always */
-        for (hsep_int i = 0; i < self->m; i += averaged_planner_together(task->planner, i)) {
-            newton += averaged_planner_of_columns(self, task->planner, work, i);
+        for (hsep_int i = 0; i < self->m; i += newton_together(task->planner, i)) {
+            newton += newton_of_columns(self, task->planner, work, i);
         }
-        left += (hsep_real)self->n_steps * (newton + (hsep_real)averaged_planner_tolerance.steps * parts);
+        left += (hsep_real)self->n_steps * (newton + (hsep_real)newton_tolerance.steps * parts);
     }
     return left;
 }
 
-/* Cut a plan: what follows costs so much, and is done when averaged_planner_go_on is called again; place: another one
+/* Cut a plan: what follows costs so much, and is done when newton_go_on is called again; place: another one
  * for each. A switch into the midst of a function goes on there, as in protothreads (Dunkels et al. 2006): what is
  * needed behind a yield is in the block. */
-#define AVERAGED_PLANNER_YIELD(where, cost) \
+#define NEWTON_YIELD(where, cost) \
     do { \
         self->place = (where); \
         self->next = (cost); \
@@ -548,23 +539,23 @@ static hsep_real averaged_planner_left(
     } while (0)
 
 /* Predict more samples under a plan, up to one. */
-#define AVERAGED_PLANNER_PREDICT(where, end, c, varies) \
+#define NEWTON_PREDICT(where, end, c, varies) \
     while (self->samples < (end)) { \
-        AVERAGED_PLANNER_YIELD(where, averaged_planner_predict(self, task, &work, NULL, varies)); \
-        (void)averaged_planner_predict(self, task, &work, c, varies); \
+        NEWTON_YIELD(where, newton_predict(self, task, &work, NULL, varies)); \
+        (void)newton_predict(self, task, &work, c, varies); \
     }
 
 /* Solve a programme in so many steps of its solver. */
-#define AVERAGED_PLANNER_SOLVE(where, steps) \
+#define NEWTON_SOLVE(where, steps) \
     for (self->status = HSEP_PLAN_OPEN; self->status >= HSEP_PLAN_BOUNDED;) { \
-        AVERAGED_PLANNER_YIELD(where, self->status == HSEP_PLAN_OPEN ? work.solve : work.step); \
-        averaged_planner_solve(self, task, steps); \
+        NEWTON_YIELD(where, self->status == HSEP_PLAN_OPEN ? work.solve : work.step); \
+        newton_solve(self, task, steps); \
     }
 
 /* Make a plan, from one yield to the next. */
-static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_averaged_task *task)
+static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 {
-    const averaged_planner_work work = averaged_planner_work_of(self, task);
+    const newton_work work = newton_work_of(self, task);
     const hsep_int all = self->late + self->preview;
     hsep_planner *planner = task->planner;
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
@@ -575,105 +566,104 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
         /* The remainder of the last plan, with the variances of all plans, which have a stack of their own */
         hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), self->samples);
         if (self->judges) {
-            AVERAGED_PLANNER_PREDICT(1, all, rest, 1)
-            self->cost = averaged_planner_cost(self, task, rest);
-            self->doubt = averaged_planner_doubt(self, task);
+            NEWTON_PREDICT(1, all, rest, 1)
+            self->cost = newton_cost(self, task, rest);
+            self->doubt = newton_doubt(self, task);
         }
         hsep_averaged_keep_ahead(task->model, self->judges > 0);
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            AVERAGED_PLANNER_YIELD(2, work.open);
-            averaged_planner_open(self, task);
-            AVERAGED_PLANNER_SOLVE(3, averaged_planner_physics_steps(self))
+            NEWTON_YIELD(2, work.open);
+            newton_open(self, task);
+            NEWTON_SOLVE(3, newton_physics_steps(self))
             self->planned = self->status == HSEP_PLAN_DONE;
         }
-        averaged_planner_copy(self, of_physics, c);
+        newton_copy(self, of_physics, c);
         self->judges = self->judges && self->planned;
         self->follows = self->follows && self->planned;
-        averaged_planner_shift(self, self->Np / hsep_planner_splines(planner)->spacing);
+        newton_shift(self, self->Np / hsep_planner_splines(planner)->spacing);
 
         /* In place of the remainder of the last plan one that ends compensation, where it is off or pauses */
         self->cost_of_rest = self->cost;
         if (self->ends) {
-            averaged_planner_copy(self, c, rest);
-            AVERAGED_PLANNER_YIELD(4, work.open);
+            newton_copy(self, c, rest);
+            NEWTON_YIELD(4, work.open);
             hsep_planner_end(planner, task->x_d);
-            AVERAGED_PLANNER_SOLVE(5, averaged_planner_tolerance.steps)
-            averaged_planner_copy(self, rest, c);
+            NEWTON_SOLVE(5, newton_tolerance.steps)
+            newton_copy(self, rest, c);
         }
         if (self->ends && self->judges) {
             self->samples = 0;
-            AVERAGED_PLANNER_PREDICT(6, all, rest, 0)
-            self->cost_of_rest = averaged_planner_cost(self, task, rest);
+            NEWTON_PREDICT(6, all, rest, 0)
+            self->cost_of_rest = newton_cost(self, task, rest);
         }
 
         /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
         if (self->follows) {
-            averaged_planner_copy(self, hsep_at(self, self->best), rest);
-            averaged_planner_copy(self, c, rest);
+            newton_copy(self, hsep_at(self, self->best), rest);
+            newton_copy(self, c, rest);
         }
         self->gains = 1;
         for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
             if (!self->gains) { /* what was predicted last was no better */
                 self->samples = 0;
-                AVERAGED_PLANNER_PREDICT(15, all, hsep_at(self, self->best), 0)
+                NEWTON_PREDICT(15, all, hsep_at(self, self->best), 0)
             }
             if (self->steps > 0) {
-                AVERAGED_PLANNER_YIELD(16, work.open);
-                averaged_planner_copy(self, c, hsep_at(self, self->best));
+                NEWTON_YIELD(16, work.open);
+                newton_copy(self, c, hsep_at(self, self->best));
                 hsep_planner_open(planner, task->x_d);
                 hsep_planner_change(planner);
             }
             hsep_planner_may_turn(planner); /* the model follows the friction */
             planner->change = self->bound;
-            AVERAGED_PLANNER_YIELD(7, work.linearise);
-            (void)averaged_planner_errors(self, task);
+            NEWTON_YIELD(7, work.linearise);
+            (void)newton_errors(self, task);
             hsep_linearised_at(
                 hsep_part(self, self->linearised), task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb),
                 self->reach);
             for (self->spline = 0; self->spline < self->m;) {
-                AVERAGED_PLANNER_YIELD(8, averaged_planner_of_columns(self, planner, &work, self->spline));
-                averaged_planner_columns(self, task);
+                NEWTON_YIELD(8, newton_of_columns(self, planner, &work, self->spline));
+                newton_columns(self, task);
             }
             for (self->spline = 0; self->spline < self->m;) {
-                AVERAGED_PLANNER_YIELD(
-                    9, averaged_planner_of_products(self, self->spline, self->spline + HSEP_AVERAGED_PRODUCTS));
-                averaged_planner_products(self, planner);
+                NEWTON_YIELD(9, newton_of_products(self, self->spline, self->spline + HSEP_NEWTON_PRODUCTS));
+                newton_products(self, planner);
             }
             hsep_planner_complete(planner, planner->jerk_weight);
-            AVERAGED_PLANNER_SOLVE(10, averaged_planner_tolerance.steps)
+            NEWTON_SOLVE(10, newton_tolerance.steps)
             self->gains = 0;
-            self->tries = HSEP_AVERAGED_TRIES;
+            self->tries = HSEP_NEWTON_TRIES;
             if (self->status != HSEP_PLAN_FAILED) {
-                self->reach = averaged_planner_next_reach(self, task);
+                self->reach = newton_next_reach(self, task);
                 self->tries = 0;
             }
-            while (self->tries < HSEP_AVERAGED_TRIES) {
+            while (self->tries < HSEP_NEWTON_TRIES) {
                 self->samples = 0;
-                AVERAGED_PLANNER_PREDICT(11, all, c, 0)
-                averaged_planner_judge(self, task);
+                NEWTON_PREDICT(11, all, c, 0)
+                newton_judge(self, task);
             }
         }
 
         /* The best of them and the physics model's plan */
-        self->left = averaged_planner_left(self, task, &work);
+        self->left = newton_left(self, task, &work);
         if (self->judges) {
             self->samples = 0;
-            AVERAGED_PLANNER_PREDICT(12, all, of_physics, 0)
-            averaged_planner_compare(self, task);
+            NEWTON_PREDICT(12, all, of_physics, 0)
+            newton_compare(self, task);
         }
 
         /* What of it may be carried out */
         if (hsep_planner_carrying(planner) > 0.0) {
-            AVERAGED_PLANNER_YIELD(13, hsep_planner_carrying(planner));
+            NEWTON_YIELD(13, hsep_planner_carrying(planner));
             hsep_planner_carry_out(planner, task->x_d);
         }
 
         /* The window under the plan, and its variances */
         self->samples = 0;
         hsep_averaged_weigh(task->model, HSEP_OF_PREDICTIONS, hsep_at(self, self->e_h), 0);
-        AVERAGED_PLANNER_PREDICT(14, self->late + self->Np, c, 1)
+        NEWTON_PREDICT(14, self->late + self->Np, c, 1)
         break;
     default:
         break;
@@ -682,26 +672,26 @@ static void averaged_planner_go_on(hsep_averaged_planner *self, const hsep_avera
     self->next = 0.0;
 }
 
-HSEP_API int hsep_averaged_planner_run(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int samples)
+HSEP_API int hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples)
 {
     hsep_real done = 0.0, due;
     do {
         done += self->next;
         self->left -= self->next;
-        averaged_planner_go_on(self, task);
+        newton_go_on(self, task);
         due = samples > 1 ? (done + self->left) / (hsep_real)samples : INFINITY;
     } while (self->place > 0 && done + 0.5 * self->next <= due);
     return self->place == 0;
 }
 
-HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hsep_averaged_task *task, hsep_int best)
+HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best)
 {
     const hsep_predictor *predictor = task->predictor;
     const size_t late = (size_t)self->late * sizeof(hsep_real);
     const hsep_real *residuals = hsep_at_const(predictor, predictor->past_e) + predictor->n; /* last ones measured */
     hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
     self->place = 0;
-    averaged_planner_copy(self, rest, hsep_planner_coefficients(task->planner));
+    newton_copy(self, rest, hsep_planner_coefficients(task->planner));
     memcpy(
         hsep_at(self, self->physics), hsep_at_const(predictor, predictor->physics),
         (size_t)(self->trial - self->physics) * sizeof(hsep_real));
@@ -711,9 +701,9 @@ HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hse
     for (hsep_int k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - task->predictor->start;
     }
-    self->bound = averaged_planner_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
+    self->bound = newton_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
     task->planner->change = hsep_averaged_doubts(task->model) ? 1.0 : self->bound;
-    averaged_planner_command(self, task, rest, HSEP_N_DECIDED + self->n);
+    newton_command(self, task, rest, HSEP_N_DECIDED + self->n);
     const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->samples = self->late + (pinned > 0 ? pinned : 1);
     hsep_averaged_forecast(
@@ -727,8 +717,8 @@ HSEP_API void hsep_averaged_planner_begin(hsep_averaged_planner *self, const hse
     self->ends = (best == 0 && was_planned > 0) || (self->judges && best > 1 && self->paused > 0);
     self->paused -= self->paused > 0;
     hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), 0); /* work follows from shares */
-    const averaged_planner_work work = averaged_planner_work_of(self, task);
+    const newton_work work = newton_work_of(self, task);
     /* This sample has cost that; what is learned at the end of the last window costs as much as commands of a plan */
     self->next = 3.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
-    self->left = self->next + averaged_planner_left(self, task, &work);
+    self->left = self->next + newton_left(self, task, &work);
 }
