@@ -91,8 +91,7 @@ typedef struct {
     hsep_divergence divergence;               /* HSEP_CONVERGES, or the outputs are invalid until hsep_*_init */
 } hsep_predictor_outputs;
 
-/* Bytes of the block; 0 if a parameter is out of its range, p > Np, q >= Np, there are no modes, or the block would not
- * fit into memory. */
+/* Bytes of the block; 0 if a parameter is out of its range, p > Np, q >= Np, there are no modes, or too many bytes. */
 HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters);
 
 /* Name of the first parameter for which that is 0, "modes" if there are none; NULL: none, or the block is too large. */

@@ -76,8 +76,7 @@ HSEP_API hsep_status hsep_call_phase(hsep_instance *instance, hsep_phase phase);
 /* End the initialization. */
 HSEP_API hsep_status hsep_call_initialise(hsep_instance *instance, const hsep_call *call);
 
-/* Do a communication step from t by h, s; the model's warnings are logged once an instance, each kind, not at every
- * step. */
+/* Do a communication step from t by h, s; each kind of the model's warnings is logged once an instance. */
 HSEP_API hsep_status hsep_call_step(hsep_instance *instance, const hsep_call *call, double t, double h);
 
 /* Saved states, hsep_saved.c: a handle is a pointer to one, or NULL. */
@@ -122,8 +121,7 @@ hsep_call_tune(const hsep_instance *instance, const hsep_call *call, unsigned re
 /* A value as a whole number of 32 bits. */
 HSEP_API int hsep_values_integer(double number);
 
-/* Beginning of a function of a version, v, that gets or sets n variables: it declares call and self, and returns if
- * they may not be. */
+/* Beginning of a version's function that gets or sets n variables: it declares call and self, or returns. */
 #define HSEP_ACCESS_OR_RETURN(v, function, handle, references, n, values, n_values) \
     const hsep_call *call = HSEP_CALL(v, function); \
     hsep_instance *self = hsep_begin(handle, call); \

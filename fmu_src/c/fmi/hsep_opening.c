@@ -117,8 +117,7 @@ static char *opening_beside(const hsep_instance *instance)
 
 #define OPENING_TABLE "variables.bin"
 
-/* That file, little-endian. Names, kinds and ranges are the binary's own, so no file can allow what the models do not.
- */
+/* That file, little-endian. Names, kinds and ranges are the binary's own: no file can allow what the models do not. */
 typedef struct {
     char magic[8];
     uint64_t size; /* of the file, bytes */

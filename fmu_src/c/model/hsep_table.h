@@ -13,8 +13,7 @@ HSEP_API size_t hsep_table_n_starts(const hsep_context *context);
 /* The row of a variable: the numbers of all modes share one each, as the samples of a window do. */
 HSEP_API const hsep_variable *hsep_table_row(const hsep_context *context, size_t place);
 
-/* The name of a variable: either the row's own string, or text, filled (mode[1].f_n, x_h_window[1]); text need not be
- * written. */
+/* The name of a variable: the row's own string, or text, which is filled then (mode[1].f_n, x_h_window[1]). */
 HSEP_API const char *hsep_table_name(const hsep_context *context, size_t place, char text[HSEP_NAME_SIZE]);
 
 /* Place of the variable of a name; n_variables if there is none. */

@@ -199,9 +199,6 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
 
 #endif
 
-/* Inputs are latched at the instants within a communication step, and executed in the step that reaches the next
- * instant. */
-
 /* Input at place, m, `after` s into the step; the importer may have set its time derivative. */
 static double online_at(const hsep_context *context, const double values[], size_t place, double after)
 {

@@ -100,8 +100,7 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
     }
 }
 
-/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb as filters, (horizon,), in place of a
- * trial. */
+/* The spline filtered by the hybrid model, G_h = (1 + W_x / (1 - W_e)) G_pb, (horizon,), in place of a trial. */
 static const hsep_real *compensator_filter_spline(hsep_compensator *self)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
@@ -147,8 +146,7 @@ static int compensator_has_stable_poles(const hsep_recursion *recursion, hsep_re
     return 1;
 }
 
-/* Samples of a window that follow the last plan while one is made. One alone is none: the spread of errors follows from
- * differences. */
+/* Samples of a window that follow the last plan while one is made: none, or two, whose differences spread needs. */
 static hsep_int compensator_pinned(hsep_compensator *self)
 {
     const hsep_int pinned = hsep_planner_pinned(hsep_compensator_planner(self));

@@ -5,11 +5,9 @@
  * samples that follow, while the command follows the last plan. With averaging every plan is solved so, over
  * HSEP_PLANNING_PINNED_AVERAGED samples (hsep_newton_run).
  *
- * Cost of a sample, with n features and m splines in a plan: as much as hsep_regression_fold(n). The end of a window
- * costs on top n^2 / 2 + p^2 / 2 + (2 preview + Np) (p + q) + m^3 / 6 + m preview multiply-adds, the last two terms
- * twice if the hybrid plan fails, and a copy of the dead time. While a plan is being solved, each of the 8 samples that
- * follow calls hsep_interior_advance six times; where fewer than 8 samples are pinned (Np < 16, or spacing > 8), more
- * often, or 2 HSEP_QP_STEPS times at once. All of it is bounded by the parameters; m = 1000 is far from real time.
+ * Cost of a sample: as hsep_predictor.h has it, and of a plan, as the planners have it, at most an equal share in each
+ * sample that follows the last plan; without averaging more where fewer than 8 do (Np < 16, or spacing > 8), or all of
+ * it at once. It is bounded by the parameters; 1000 splines in a plan are far from real time.
  *
  * A block as hsep_layout.h has them. Once the parameters are in range nothing here fails but the prediction of a
  * window, as in hsep_predictor.h.
@@ -22,8 +20,7 @@
 #include "hsep_predictor.h"
 #include "hsep_newton.h"
 
-/* Samples in a row above the largest following error that trip: one or two may be outliers of the sensor. Missing ones
- * do not count. */
+/* Samples in a row above the largest following error that trip, but for missing ones: one or two may be outliers. */
 #define HSEP_OVER 3
 
 struct hsep_compensator {

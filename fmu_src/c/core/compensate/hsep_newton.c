@@ -125,8 +125,7 @@ static hsep_linearised_change newton_shape(hsep_newton *self, const hsep_planner
         .passed = hsep_at(self, self->passed) + level * self->preview};
 }
 
-/* Begin the physics model's plan at the remainder of the last one, which was predicted last: W' W, and W' times the
- * weighted error. */
+/* Begin the physics model's plan at the remainder of the last one, which was predicted last: W' W, W' error. */
 static void newton_open(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *weight = hsep_at(self, self->weight);
@@ -271,8 +270,7 @@ static hsep_int newton_physics_steps(const hsep_newton *self)
     return self->follows ? HSEP_NEWTON_PHYSICS_STEPS : newton_tolerance.steps;
 }
 
-/* Do a part of the solution of a programme in so many steps: its factor and what its bounds allow, then the solver's.
- */
+/* Do a part of the solution of a programme in so many steps: its factor and whether bounds allow it; the solver's. */
 static void newton_solve(hsep_newton *self, const hsep_newton_task *task, hsep_int steps)
 {
     hsep_tolerance tolerance = newton_tolerance;
@@ -305,8 +303,7 @@ static hsep_real newton_next_reach(hsep_newton *self, const hsep_newton_task *ta
     return hsep_fmax(HSEP_NEWTON_LEAST_REACH, HSEP_NEWTON_REACH * speed);
 }
 
-/* Judge a length of a step, whose end the planner has, and take it if it is better; otherwise a shorter one is tried.
- */
+/* Judge a length of a step, whose end the planner has; take it if it is better, otherwise a shorter one is tried. */
 static void newton_judge(hsep_newton *self, const hsep_newton_task *task)
 {
     hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
@@ -374,8 +371,7 @@ static void newton_take(hsep_newton *self, const hsep_planner *planner)
     }
 }
 
-/* Take the plan whose cost is lowest, of the averaged model's change of the last one a share; the physics model's was
- * predicted last. */
+/* Take the plan that costs least, of the averaged model's change a share; the physics model's was predicted last. */
 static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real of_physics = newton_cost(self, task, hsep_at(self, self->of_physics));

@@ -91,21 +91,15 @@ HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_compensator
 HSEP_API void hsep_newton_init(
     hsep_newton *self, const hsep_compensator_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 
-/* Begin a window: predict it under the remainder of the last plan. best: best model allowed, 0 none, 1 physics, 2
- * averaged, which judges plans once the warm-up is over. It predicts only the samples
- * that the plan leaves as they are, and the late ones before them. Cost: as hsep_averaged_forecast; a late
- * measurement adds late^2 / 2 multiply-adds for each expert, here and in the last part, for variances. */
+/* Begin a window: predict it under the remainder of the last plan, but only samples that the plan leaves as they are,
+ * and late ones. best: best model allowed, 0 none, 1 physics, 2 averaged, which judges plans once the warm-up is over.
+ * Cost: as hsep_averaged_forecast; late samples add late^2 / 2 for each expert, here and in the last part. */
 HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best);
 
 /* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that is left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
- * Cost: of a plan at most, with n splines that are solved for and all = preview + late samples, f^2 / 2 multiply-adds
- * for each expert with f features, for each sample of a window twice and for every HSEP_NEWTON_APART behind it; 3 steps
- * of the physics model's programme, and 1 or 2 Newton steps of n preview p / 3 for each expert, n^2 preview / 4, 2
- * predictions, and 5 steps of their programmes; or 5 steps of the first, and of the programme of a plan that ends
- * compensation, which has all splines that are not pinned; a second length of a Newton step, rarely tried, adds
- * a prediction to the last sample. A step of a programme is n^3 / 6 + 3 n^2 + 720 preview, a prediction all (f + 60)
- * for each expert, and 700 all. */
+ * Cost: of a plan as newton_left counts it; a second length of a Newton step, rarely tried, adds a prediction to the
+ * last sample. */
 HSEP_API int hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples);
 
 #endif

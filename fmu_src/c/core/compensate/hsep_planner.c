@@ -190,8 +190,7 @@ static inline void planner_range(const hsep_planner *self, hsep_int r, hsep_real
     *most = hsep_fmax(*most, total + HSEP_QP_INTERIOR);
 }
 
-/* Largest feasible step length, 0 ... 1, by a step with rows way, from a feasible plan, whose rows are those of the
- * remainder and from. */
+/* Largest feasible length, 0 ... 1, of a step with rows way from a plan, with rows of the remainder + from. */
 static hsep_real planner_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[])
 {
     const hsep_real *total = hsep_at_const(self, self->total);

@@ -92,9 +92,8 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
 /* Let plans of this window turn where no_reversal forbids it. */
 HSEP_API void hsep_planner_may_turn(hsep_planner *self);
 
-/* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline behind the
- * model, (preview,); target: x_d minus the model's response to x_d plus the decided part of delta, m, (preview,). Cost:
- * n preview multiply-adds. */
+/* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline behind it,
+ * (preview,); target: x_d minus its response to x_d plus the decided part of delta, (preview,) m. It costs n preview. */
 HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
 
 /* Open a change of the last plan that ends compensation, with the cost of delta itself, and of its jerk, which makes it
@@ -122,8 +121,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self);
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[]);
 HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_real c[]);
 
-/* Shorten the plan, once it is made, to what keeps the limits whatever follows what is known. x_d: as for
- * hsep_planner_open. */
+/* Shorten the plan, once it is made, to what keeps the limits whatever follows the known part of x_d, (preview,), m. */
 HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[]);
 
 /* What that costs, in multiply-adds; 0 where plans end with what is known. */

@@ -158,8 +158,7 @@ HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[],
     }
 }
 
-/* sums, (HSEP_SPLINES_TOGETHER,): products of splines i, i + 1, ..., each with the spline d behind it. sorted:
- * (4, preview). */
+/* sums, (HSEP_SPLINES_TOGETHER,): products of splines i, i + 1, ..., each with the one d behind; of sorted weights. */
 static void splines_products(
     const hsep_splines *self, const hsep_real sorted[], hsep_int i, hsep_int d, hsep_real sums[])
 {
@@ -265,8 +264,7 @@ HSEP_API void hsep_splines_jerk(
     }
 }
 
-/* Cubic splines with knots 1, 2 and 4 spacings apart as sums of those 1 apart: the two-scale relation, once and twice.
- */
+/* Cubic splines with knots 1, 2 and 4 spacings apart as sums of those 1 apart: the two-scale relation. */
 static const hsep_real knots_shares[] = {1.0,      0.125,   0.5,     0.75,     0.5,     0.125,  0.015625,
                                          0.0625,   0.15625, 0.3125,  0.484375, 0.625,   0.6875, 0.625,
                                          0.484375, 0.3125,  0.15625, 0.0625,   0.015625};

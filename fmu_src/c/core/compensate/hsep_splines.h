@@ -57,8 +57,7 @@ HSEP_API void hsep_splines_init(
 /* Another limit of an order from now on, m a sample to that power. Cost: 10 spacing operations. */
 HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real limit);
 
-/* Sum of the first count splines at sample k, with coefficients c, (count,), which begin with splines -3, -2, -1. 4
- * multiply-adds. */
+/* Sum of the first count splines at sample k, with coefficients c, (count,), from spline -3 on. 4 multiply-adds. */
 HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int k);
 
 /* The rows of the splines first ... n - 1 with coefficients c, (n - first,). Cost: 14 operations a sample. */
@@ -69,13 +68,12 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
 HSEP_API void hsep_splines_exceeded(
     const hsep_splines *self, const hsep_real x_d[], const hsep_real before[3], hsep_int count, hsep_real rows[]);
 
-/* g, (n - first,), += A' rows: the transpose of hsep_splines_rows, whose matrix is A. The rows are
- * used up. Cost: 9 operations a sample, and 4 preview multiply-adds. */
+/* g, (n - first,), += A' rows, A being the matrix of hsep_splines_rows. The rows are used up. Cost: 9 operations a
+ * sample, and 4 preview multiply-adds. */
 HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[]);
 
-/* The products A' diag(weights) A (hsep_knots_add), A being the matrix of hsep_splines_rows. work: (4 preview +
- * 4 HSEP_LANES_MOST,), of which the last ones are read beside others. Cost: 40 spacing multiply-adds for each of these
- * splines. */
+/* The products A' diag(weights) A (hsep_knots_add). work: (4 preview + 4 HSEP_LANES_MOST,), of which the last ones are
+ * read beside others. Cost: 40 spacing multiply-adds for each of these splines. */
 HSEP_API void hsep_splines_gram(
     const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real products[], hsep_real work[]);
 

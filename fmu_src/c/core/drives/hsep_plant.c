@@ -149,8 +149,7 @@ static double plant_friction_velocity(double w, double gain, double scale, doubl
     return sign * v;
 }
 
-/* The slope of z, (2 n_modes,), under a command disturbed by friction of the commanded velocity; v, m/s, is a velocity
- * shortly before. */
+/* The slope of z, (2 n_modes,), under a command disturbed by its friction; v, m/s, is a velocity shortly before. */
 static void plant_stage_slope(const hsep_stage *s, const double z[], double disturbed, double v, double slope[])
 {
     const hsep_stage_mode *mode = stage_modes(s);

@@ -112,8 +112,7 @@ HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_paramete
     const int fits = preview >= Np + Np / 2 + 5 * settings->spacing + HSEP_SPLINES_END;
     derived.predictor.preview = preview;
     derived.predictor.horizon = fits && settings->horizon > preview ? settings->horizon : preview;
-    /* The warm-up counts from the end of the first fill; without one, the first window is planned with what is
-     * known. */
+    /* The warm-up counts from the end of the first fill; without one, what is known plans the first window. */
     derived.predictor.n_init = parameters_samples(t_init > 0.0 ? t_init + (hsep_real)preview * T_s : 0.0, T_s);
     derived.predictor.planned = 1;
     return derived;

@@ -44,8 +44,7 @@ HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[]);
 /* Add the state of another one with the same parameters: it responds to the sum of both commands then. */
 HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other);
 
-/* Response x_pb, m, to the command x_d of the next sample, m, relative to the initial position; eq. (2). Cost: 9
- * multiply-adds a mode. */
+/* Response x_pb, m, to the command x_d of the next sample, m, relative to the start; eq. (2). 9 operations a mode. */
 HSEP_API hsep_real hsep_physics_respond(hsep_physics *self, hsep_real x_d);
 
 #define HSEP_PHYSICS_ABREAST 4 /* signals side by side at most */

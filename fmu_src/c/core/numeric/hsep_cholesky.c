@@ -18,8 +18,7 @@ static int cholesky_pivot(hsep_real row[], hsep_int length, const hsep_real *lea
     return 1;
 }
 
-/* Finish count rows, from row k of n on, from which the rows above have been subtracted; return whether they have
- * pivots. */
+/* Finish count rows, from which those above the panel have been subtracted; return whether they have pivots. */
 static int cholesky_panel(
     hsep_real *const rows[HSEP_CHOLESKY_PANEL], hsep_int count, hsep_int length, const hsep_real least[])
 {

@@ -30,8 +30,7 @@ HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_int n, hsep_int
  * behind them what these rows leave of them. Cost: count (n - count / 2) multiply-adds. */
 HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_int n, hsep_int count, hsep_real b[]);
 
-/* Turn b, (count,), into the solution x of R x = b by the first count rows and columns. Cost: count^2 / 2
- * multiply-adds. */
+/* Turn b, (count,), into the solution x of R x = b by the first count rows and columns. Cost: count^2 / 2. */
 HSEP_API void hsep_cholesky_backward(const hsep_real triangle[], hsep_int n, hsep_int count, hsep_real b[]);
 
 /* Turn b, (n,), into the solution x of R' R x = b. Cost: n^2 multiply-adds. */

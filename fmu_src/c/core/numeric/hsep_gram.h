@@ -22,16 +22,14 @@ typedef struct {
 } hsep_gram;
 HSEP_ASSERT_WORDS(hsep_gram, 6);
 
-/* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */
+/* A block of about 8 n^2 bytes for n >= 1 features, without rows. */
 HSEP_API hsep_real hsep_gram_size(hsep_int n);
-/* Fill the block for n >= 1 features, without rows. */
 HSEP_API void hsep_gram_init(hsep_gram *self, hsep_int n);
 
 /* Where the next row goes, (n + 1,): phi, then its target; what is there before does not matter. */
 HSEP_API hsep_real *hsep_gram_row(hsep_gram *self);
 
-/* Take in that row, all entries of which must be finite. Cost: n^2 / 2 times 4 multiply-adds and 6 additions at every
- * fourth row. */
+/* Take in that row, all entries finite. Cost: n^2 / 2 times 4 multiply-adds and 6 additions at every fourth row. */
 HSEP_API void hsep_gram_fold(hsep_gram *self);
 
 /* Take in row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into hsep_gram_row: all n + 1

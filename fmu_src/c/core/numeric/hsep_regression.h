@@ -25,10 +25,9 @@ typedef struct {
 } hsep_regression;
 HSEP_ASSERT_WORDS(hsep_regression, 6);
 
-/* Bytes of the block, counted as a number so that no size can overflow: about 8 n^2. */
+/* A block of about 8 n^2 bytes for n >= 1 features and lambda > 0, in the unit of a row's entry squared; less than
+ * 1e-290 counts as 1e-290, so that its reciprocal is a number. */
 HSEP_API hsep_real hsep_regression_size(hsep_int n);
-/* Fill the block for n >= 1 features and lambda > 0, in the unit of a row's entry squared.
- * A lambda below 1e-290 counts as 1e-290, so that its reciprocal is a number. */
 HSEP_API void hsep_regression_init(hsep_regression *self, hsep_int n, hsep_real lambda);
 
 /* Where the next row goes, (n + 1,): phi, then its target. */

@@ -52,7 +52,7 @@ typedef struct {
 } hsep_solution;
 HSEP_ASSERT_WORDS(hsep_solution, 16);
 
-/* Bytes of the block, counted as a number so that no size can overflow: about 4 n^2. */
+/* A block of about 4 n^2 bytes. */
 HSEP_API hsep_real hsep_solution_size(hsep_int n_head, hsep_int n_tail, hsep_int room);
 HSEP_API void hsep_solution_init(hsep_solution *self, hsep_int n_head, hsep_int n_tail, hsep_int room);
 
@@ -67,8 +67,7 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
 /* Take another row of features, as the Gram matrix has them, and its target; the rows behind room are not taken. */
 HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_real target);
 
-/* Multiply-adds that it takes at most until the head is factored and has taken in the rows that wait, and as many as
- * are to come. */
+/* Multiply-adds at most until the head is factored and has taken in the rows that wait, and so many to come. */
 HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come);
 
 /* Take in four rows that wait, or factor some of the head, until an amount of multiply-adds is spent, and return what

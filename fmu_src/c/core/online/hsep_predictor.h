@@ -9,12 +9,11 @@
  * the commands of a window, calls the parts in this order: hsep_predictor_take_in at each sample; at the end of a
  * window hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
  *
- * Cost of a sample, with n features: as much as hsep_regression_fold(n), and alone 9 multiply-adds a mode; at the end
- * of a window (Np (p + q + 2) + n^2 / 2) multiply-adds on top. Never more, at no sample number. With averaging a sample
- * costs two hsep_gram_fold, before the end of a window a share of the next solutions (hsep_solution.h), and the end of
- * a window hsep_averaged_learn and hsep_averaged_forecast. The latter leaves most of the window that begins to the next
- * samples: each of them does a part. At the end of a first window whose commands begin in motion all
- * its rows are folded and the solutions factored at once.
+ * Cost of a sample, at any sample number: hsep_regression_fold and hsep_physics_respond; at the end of a window also
+ * hsep_regression_solve and hsep_recursion_run. With averaging two hsep_gram_fold, before the end of a window a share
+ * of the next solutions (hsep_solution.h), at its end hsep_averaged_learn and the first part of hsep_averaged_forecast,
+ * whose other parts the next samples do. At the end of a first window whose commands begin in motion all its rows are
+ * folded and the solutions factored at once.
  *
  * A block as hsep_layout.h has them. Once the parameters are in range nothing here fails but the prediction of a
  * window: the learned recursion may diverge; then divergence is set and the outputs are invalid from there on.
@@ -71,8 +70,7 @@ HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predi
 HSEP_API void hsep_predictor_block_init(
     hsep_predictor *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
-/* Parts of the block: the physics model; the residual model, NULL if it is the other one; and what is known of the
- * errors of x_h. */
+/* Parts of the block: the physics model; the residual model, NULL if it is the other one; what errors of x_h follow. */
 static inline hsep_physics *hsep_predictor_physics(hsep_predictor *self) { return hsep_part(self, self->physics); }
 static inline hsep_paper *hsep_predictor_paper(hsep_predictor *self)
 {
@@ -87,8 +85,7 @@ static inline hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self)
     return hsep_part(self, self->uncertainty);
 }
 
-/* Process sample k: learn it if it is sound, update the error sums, advance to k + 1; return whether the window has
- * ended. */
+/* Process sample k: learn it if it is sound, update the error sums, advance to k + 1; return whether a window ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas, int is_sound);
 
 /* Predict at once what is left of the window, alone; later samples are the same. */
@@ -106,8 +103,7 @@ HSEP_API void hsep_predictor_predict(hsep_predictor *self, hsep_int first, hsep_
 /* Publish the samples of the window up to last - 1, whose x_pb are in past_x and residuals in e_h; eq. (4). */
 HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_int last);
 
-/* Predict the errors of samples first ... last - 1 of the n, hsep_predictor_std, which were published, their commands
- * being in command. */
+/* Predict the errors of samples first ... last - 1 of the n, hsep_predictor_std, which were published. */
 HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_int first, hsep_int last);
 
 /* Leading samples in the warm-up, of the window and so many late ones before it. */

@@ -126,8 +126,7 @@ static inline void uncertainty_add(uncertainty_sums *sums, hsep_real e, hsep_rea
     sums->missed_late += missed * place;
 }
 
-/* Follow the size of the residuals and the shares of errors beyond the intervals; after the first window, begin with
- * its mean square error. */
+/* Follow the size of residuals and the shares of errors beyond intervals, from the first window's mean square on. */
 static inline void uncertainty_follow(hsep_uncertainty *self, const uncertainty_sums *sums)
 {
     const hsep_real count = sums->count, mean_square = hsep_fmin(sums->squares / count, HSEP_PREDICTION_MAX);
@@ -164,8 +163,7 @@ static inline void uncertainty_step_by(
     }
 }
 
-/* Learn from the measured residuals e, (Np,), m, of its first samples; accepted: (Np,), 1 where they count, or NULL for
- * all of them. */
+/* Learn from measured residuals e, (Np,), m, of its first samples; accepted: (Np,), 1 where one counts; NULL: all. */
 static inline void hsep_uncertainty_learn(hsep_uncertainty *self, const hsep_real e[], const hsep_real accepted[])
 {
     const hsep_int newest = self->n - self->Np; /* place of the last one that is measured */

@@ -103,8 +103,7 @@ static void averaged_solve(hsep_averaged *self, int outgrown)
     }
 }
 
-/* Begin the prediction of commands x_d by the experts that know something. past: (p,) m, the last residuals of the
- * physics model. */
+/* Begin a prediction by the experts that know something. past: (p,) m, the last residuals of the physics model. */
 static void averaged_begin(hsep_averaged *self, const hsep_real past[])
 {
     const hsep_residual_scale *of_physics = &self->learned.scales[HSEP_MODEL_RESIDUAL];

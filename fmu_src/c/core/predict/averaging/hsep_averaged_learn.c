@@ -59,8 +59,7 @@ static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], co
     self->n_accepted = 0.0;
 }
 
-/* Features of the window up to sample last - 1 as they were measured, and the residual of the command, from known
- * on. */
+/* Features of the window as measured, and the residual of the command, from known on up to sample last - 1. */
 static void averaged_take_rows(hsep_averaged *self, const hsep_real x_pb[], const hsep_real e[], hsep_int last)
 {
     const hsep_int first = self->known, Np = self->Np;

@@ -17,12 +17,10 @@
 #include "hsep_recall.h"
 #include "hsep_stacking.h"
 
-/* Samples of a window that are learned at each sample: two, to catch up with samples measured before all of the window
- * was predicted. */
+/* Samples that are learned at each sample: two, to catch up with those measured before a window was all predicted. */
 #define HSEP_AVERAGED_PACE 2
 
-/* Multiply-adds as which an entry of a Gram matrix counts where four rows are added to it, and where a solution begins
- * with it. */
+/* Multiply-adds as which an entry of a Gram matrix counts where four rows are added, and where a solution begins. */
 #define HSEP_AVERAGED_OF_GRAM 5.0
 #define HSEP_AVERAGED_OF_BEGINNING 4.0
 
@@ -154,8 +152,7 @@ HSEP_API void hsep_averaged_forecast(
 HSEP_API void hsep_averaged_go_on(
     hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], hsep_int first, hsep_int last, hsep_int apart);
 
-/* Predict other commands with the same scales and weights, in the samples 0 ... last - 1; hsep_averaged_go_on predicts
- * more. e: (n + p,), m. */
+/* Predict samples 0 ... last - 1 of other commands with the same scales and weights; hsep_averaged_go_on does more. */
 HSEP_API void hsep_averaged_predict(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last, hsep_int apart);
 

@@ -51,8 +51,7 @@ HSEP_ASSERT_WORDS(hsep_residual_scale, 3);
 HSEP_ASSERT_WORDS(hsep_expert_errors, 2);
 HSEP_ASSERT_WORDS(hsep_expert, 17);
 
-/* Take another window of residuals, (n,), m, into a scale; accepted: (n,), 1 where it counts; count: how many do;
- * level: m, of their run. */
+/* Take a window of residuals, (n,), m, into a scale; accepted: (n,), 1 for the count that do; level: m, of the run. */
 HSEP_API void hsep_residual_scale_follow(
     hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count,
     hsep_real level);
@@ -72,9 +71,8 @@ static inline const hsep_real *hsep_expert_weights(const hsep_expert *self)
     return hsep_at_const(solution, solution->weights);
 }
 
-/* Take the penalties that the next weights are solved for with from the rows so far, rows of earlier runs weighed by
- * weight, which hsep_solution_begin takes, too. first, least: m2, variance of the noise while it is not known, and the
- * least one. */
+/* Take the penalties that the next weights are solved for with from the rows so far, those of earlier runs weighed by
+ * weight. first, least: m2, variance of the noise while it is not known, and the least one. */
 HSEP_API void hsep_expert_prepare(
     hsep_expert *self, hsep_warm_start *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,
     hsep_real least);

@@ -56,8 +56,7 @@ static inline void hsep_stack_init(hsep_stack *self)
     }
 }
 
-/* Support of weights, with R' R = H on it: R' is lower triangular, z = R'^-1 l, ones = R'^-1 1; and the products of
- * both up to each place. */
+/* Support of weights, with R' R = H on it: rows of R', z = R'^-1 l, ones = R'^-1 1; their products up to each place. */
 typedef struct {
     int places[HSEP_N_EXPERTS];
     hsep_real rows[HSEP_N_EXPERTS][HSEP_N_EXPERTS], z[HSEP_N_EXPERTS], ones[HSEP_N_EXPERTS];

@@ -64,8 +64,7 @@ static inline void hsep_start_init(hsep_start *self, const hsep_predictor_parame
     hsep_regression_init(hsep_part(self, self->regression), self->n_states, HSEP_START_DAMPING);
 }
 
-/* Response x_pb, (count,), m, to the state that is tried, and to a command that comes to 0 by step m a sample while the
- * measurement is late. */
+/* Response x_pb, (count,), m, to the state that is tried, and to a command that comes to 0 by step m a late sample. */
 static inline void start_respond(hsep_start *self, hsep_real step, hsep_real x_pb[], hsep_int count)
 {
     hsep_physics *trial = hsep_part(self, self->trial);
