@@ -28,9 +28,8 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_c
 static hsep_physics *compensator_trial(hsep_compensator *self)
 {
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
-    return memcpy(
-        hsep_at(self, self->trial), hsep_at_const(predictor, predictor->physics),
-        (size_t)(self->planner - self->trial) * sizeof(hsep_real));
+    return hsep_copy(
+        hsep_at(self, self->trial), hsep_at_const(predictor, predictor->physics), self->planner - self->trial);
 }
 
 HSEP_API void hsep_compensator_block_init(
@@ -91,8 +90,8 @@ static void compensator_target(hsep_compensator *self, hsep_sep_state state)
     }
     if (state == HSEP_SEP_HYBRID) {
         const hsep_recursion recursion = hsep_paper_recursion(hsep_predictor_paper(predictor), 1);
-        memcpy(x + horizon, hsep_at(predictor, predictor->past_x) + Np, (size_t)predictor->q * sizeof(hsep_real));
-        memcpy(e + horizon, hsep_at(predictor, predictor->past_e) + Np, (size_t)predictor->p * sizeof(hsep_real));
+        hsep_copy(x + horizon, hsep_at(predictor, predictor->past_x) + Np, predictor->q);
+        hsep_copy(e + horizon, hsep_at(predictor, predictor->past_e) + Np, predictor->p);
         hsep_recursion_run(&recursion, x, e, horizon, 0, horizon);
         for (hsep_int k = 0; k < horizon; k++) {
             target[k] -= e[horizon - 1 - k];
@@ -111,8 +110,8 @@ static const hsep_real *compensator_filter_spline(hsep_compensator *self)
     for (hsep_int k = 0; k < horizon; k++) {
         x[horizon - 1 - k] = spline_pb[k];
     }
-    memset(x + horizon, 0, (size_t)recursion.q * sizeof(hsep_real));
-    memset(e + horizon, 0, (size_t)recursion.p * sizeof(hsep_real));
+    hsep_zero(x + horizon, recursion.q);
+    hsep_zero(e + horizon, recursion.p);
     hsep_recursion_run(&recursion, x, e, horizon, 0, horizon);
     for (hsep_int k = 0; k < horizon; k++) {
         x[k] = spline_pb[k] + e[horizon - 1 - k];
@@ -171,9 +170,9 @@ static void compensator_publish(hsep_compensator *self, hsep_int last)
     }
     if (self->averaged) { /* the window's part of the preview, and what is late before it */
         const hsep_newton *averaged = hsep_compensator_newton(self);
-        memcpy(
+        hsep_copy(
             hsep_at(predictor, predictor->e_h), hsep_at_const(averaged, averaged->e_h) + (averaged->preview - Np),
-            (size_t)predictor->n * sizeof(hsep_real));
+            predictor->n);
     } else {
         hsep_predictor_predict(predictor, first, last);
     }
@@ -323,8 +322,8 @@ static void compensator_begin_loads(hsep_compensator *self)
     const hsep_int oldest = predictor->k % predictor->preview, newest = predictor->preview - oldest;
     const hsep_real *loads = hsep_at(self, self->loads);
     hsep_real *load = hsep_at(self, self->load);
-    memcpy(load, loads + oldest, (size_t)newest * sizeof(hsep_real));
-    memcpy(load + newest, loads, (size_t)oldest * sizeof(hsep_real));
+    hsep_copy(load, loads + oldest, newest);
+    hsep_copy(load + newest, loads, oldest);
     for (hsep_int k = predictor->preview; k < compensator_horizon(self); k++) {
         load[k] = load[k - 1];
     }

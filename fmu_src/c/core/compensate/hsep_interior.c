@@ -32,7 +32,7 @@ static void slacks_take_rows(const slacks *self, const hsep_real *low, const hse
     hsep_real *second = to + self->n / 2;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         const hsep_int begin = self->range[order].begin, count = self->range[order].count;
-        memcpy(to, low + begin, (size_t)count * sizeof(hsep_real));
+        hsep_copy(to, low + begin, count);
         for (hsep_int r = 0; r < count; r++) {
             second[r] = -high[begin + r];
         }
@@ -47,7 +47,7 @@ static void slacks_give_rows(const slacks *self, const hsep_real *y, hsep_real s
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         hsep_real *rows = self->rows + self->range[order].begin;
         const hsep_int count = self->range[order].count;
-        memcpy(rows, y, (size_t)count * sizeof(hsep_real));
+        hsep_copy(rows, y, count);
         hsep_axpy(rows, sign, high, count);
         y += count, high += count;
     }
@@ -196,7 +196,7 @@ static void interior_rows(const interior_arrays *a, const hsep_real x[])
 /* g, (n,), += A' of the rows. */
 static void interior_transpose(const interior_arrays *a, hsep_real g[])
 {
-    memset(a->problem.c, 0, (size_t)a->knots->n * sizeof(hsep_real));
+    hsep_zero(a->problem.c, a->knots->n);
     hsep_splines_transpose(a->splines, a->slacks.rows, a->first, a->problem.c);
     hsep_knots_narrow(a->knots, a->problem.c, g);
 }
@@ -240,14 +240,14 @@ HSEP_API void hsep_interior_begin(
 static hsep_real interior_dual_residual(const interior_arrays *a, const hsep_real *P)
 {
     hsep_real residual = 0.0, largest = 0.0;
-    memcpy(a->r_d, a->problem.v, (size_t)a->n * sizeof(hsep_real));
+    hsep_copy(a->r_d, a->problem.v, a->n);
     for (hsep_int i = 0; i < a->n; i++) { /* v - P x */
         const hsep_int left = a->n - i - 1;
         a->r_d[i] -= hsep_dot(P, a->problem.x + i, left + 1);
         hsep_axpy(a->r_d + i + 1, -a->problem.x[i], P + 1, left);
         P += left + 1;
     }
-    memset(a->dx, 0, (size_t)a->n * sizeof(hsep_real));
+    hsep_zero(a->dx, a->n);
     slacks_give_rows(&a->slacks, a->slacks.z, -1.0);
     interior_transpose(a, a->dx);
     for (hsep_int j = 0; j < a->n; j++) {
@@ -268,7 +268,7 @@ static void interior_direction(const interior_arrays *a)
         AT(ds) = AT(r_c) - AT(z) * AT(inverse) * AT(r_p);
     }
     slacks_give_rows(&it, it.ds, -1.0);
-    memcpy(a->dx, a->r_d, (size_t)a->n * sizeof(hsep_real));
+    hsep_copy(a->dx, a->r_d, a->n);
     interior_transpose(a, a->dx);
     hsep_cholesky_solve(a->factor, a->n, a->dx);
     interior_rows(a, a->dx);
@@ -282,7 +282,7 @@ static int interior_residuals(hsep_interior *self, const interior_arrays *a, con
     const hsep_real mu = slacks_take_residuals(&a->slacks, &r_p, &beyond);
     if (beyond < self->beyond) {
         self->beyond = beyond;
-        memcpy(a->problem.inner, a->problem.x, (size_t)a->n * sizeof(hsep_real));
+        hsep_copy(a->problem.inner, a->problem.x, a->n);
     }
     const hsep_real r_d = interior_dual_residual(a, P);
     if (self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
@@ -299,7 +299,7 @@ static int interior_factor(const interior_arrays *a, const hsep_real P[], hsep_i
 {
     const hsep_int panel = HSEP_CHOLESKY_PANEL, ends[] = {0, a->n / 12 / panel * panel, a->n / 4 / panel * panel, a->n};
     if (part == 0) {
-        memcpy(a->factor, P, (size_t)hsep_triangle(a->n) * sizeof(hsep_real));
+        hsep_copy(a->factor, P, (hsep_int)hsep_triangle(a->n));
         const slacks it = a->slacks;
         for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* the weights W */
             AT(ds) = AT(z) * AT(inverse);

@@ -228,7 +228,7 @@ HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model,
      * it, and their response to it */
     const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
     hsep_real *base = hsep_at(self, self->base);
-    memcpy(base, change->passed, (size_t)self->preview * sizeof(hsep_real));
+    hsep_copy(base, change->passed, self->preview);
     for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
         const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
         const hsep_real weight = linearised_weight(model, i, HSEP_COMMAND_RESIDUAL);
@@ -370,7 +370,7 @@ static void linearised_add(
             hsep_at(self, self->disturbance)[HSEP_PHYSICS_ABREAST * u + c] = 0.0;
         }
         filters[c] = hsep_part(self, self->filters + c * words);
-        memcpy(filters[c], hsep_at(self, self->physics), (size_t)words * sizeof(hsep_real));
+        hsep_copy(filters[c], hsep_at(self, self->physics), words);
     }
     hsep_physics_abreast(
         filters, HSEP_PHYSICS_ABREAST, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)padded);
@@ -392,7 +392,7 @@ HSEP_API void hsep_linearised_columns(
 {
     for (hsep_int c = 0; c < count; c++) { /* what does not pass through the disturbances */
         const hsep_int length = self->preview - first - c * spacing;
-        memcpy(columns[c], hsep_at(self, self->base), (size_t)length * sizeof(hsep_real));
+        hsep_copy(columns[c], hsep_at(self, self->base), length);
         for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
             const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - length);
             const hsep_real *response = linearised_response(self, i);

@@ -48,7 +48,7 @@ static int newton_better(hsep_real cost, hsep_real other) { return cost < (1.0 -
 
 static void newton_copy(hsep_newton *self, hsep_real to[], const hsep_real from[])
 {
-    memcpy(to, from, (size_t)(HSEP_N_DECIDED + self->n) * sizeof(hsep_real));
+    hsep_copy(to, from, HSEP_N_DECIDED + self->n);
 }
 
 /* Commands under the first count coefficients of a plan, and the response of the physics model to them. */
@@ -57,7 +57,7 @@ static void newton_command(hsep_newton *self, const hsep_newton_task *task, cons
     const hsep_splines *splines = hsep_planner_splines(task->planner);
     hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
     hsep_physics *trial = hsep_part(self, self->trial);
-    memcpy(trial, hsep_at(self, self->physics), (size_t)(self->trial - self->physics) * sizeof(hsep_real));
+    hsep_copy(trial, hsep_at(self, self->physics), self->trial - self->physics);
     for (hsep_int k = 0; k < self->preview; k++) {
         const hsep_int j = self->preview - 1 - k;
         command[j] = task->x_d[k] - task->predictor->start + hsep_splines_sum(splines, c, count, k) + task->load[k];
@@ -143,9 +143,7 @@ static void newton_open(hsep_newton *self, const hsep_newton_task *task)
         const hsep_real *passed = newton_shape(self, task->planner, level).passed;
         v[i] = hsep_dot(passed, target + begin, self->preview - begin);
     }
-    memcpy(
-        hsep_planner_quadratic(task->planner), hsep_at(self, self->gram),
-        (size_t)hsep_triangle(self->m) * sizeof(hsep_real));
+    hsep_copy(hsep_planner_quadratic(task->planner), hsep_at(self, self->gram), (hsep_int)hsep_triangle(self->m));
     hsep_planner_complete(task->planner, task->planner->jerk_weight);
 }
 
@@ -208,7 +206,7 @@ static void newton_products(hsep_newton *self, hsep_planner *planner)
                 rights[c] += from;
             }
             hsep_dot_four(W + i * preview + from, rights, preview - from, sums);
-            memcpy(P, sums, (size_t)count * sizeof(hsep_real));
+            hsep_copy(P, sums, count);
             P += count;
         }
         v[i] = hsep_dot(W + i * preview + begins[i], target + begins[i], preview - begins[i]);
@@ -227,8 +225,8 @@ static void newton_shape_all(hsep_newton *self, hsep_planner *plans, const hsep_
         const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
         const hsep_linearised_change change = newton_shape(self, plans, knot.level);
         newton_begins(self)[i] = begin;
-        memset(change.commands, 0, (size_t)change.n * sizeof(hsep_real));
-        memset(change.passed, 0, (size_t)preview * sizeof(hsep_real));
+        hsep_zero(change.commands, change.n);
+        hsep_zero(change.passed, preview);
         for (hsep_int j = 0; j < knot.length; j++) {
             hsep_axpy(change.commands + j * spacing, knot.share[j], b, 4 * spacing);
             if (j * spacing < preview) {
@@ -242,8 +240,7 @@ static void newton_shape_all(hsep_newton *self, hsep_planner *plans, const hsep_
     while (self->spline < self->m) {
         newton_products(self, plans);
     }
-    memcpy(
-        hsep_at(self, self->gram), hsep_planner_quadratic(plans), (size_t)hsep_triangle(self->m) * sizeof(hsep_real));
+    hsep_copy(hsep_at(self, self->gram), hsep_planner_quadratic(plans), (hsep_int)hsep_triangle(self->m));
 }
 
 HSEP_API void hsep_newton_init(
@@ -339,8 +336,8 @@ static void newton_shift(hsep_newton *self, hsep_int kept)
 {
     hsep_real *corrected = hsep_at(self, self->corrected);
     const hsep_int left = self->follows ? self->n - kept : 0;
-    memmove(corrected, corrected + (self->n - left), (size_t)left * sizeof(hsep_real));
-    memset(corrected + left, 0, (size_t)(self->n - left) * sizeof(hsep_real));
+    hsep_copy(corrected, corrected + (self->n - left), left);
+    hsep_zero(corrected + left, self->n - left);
 }
 
 /* Take a share of what the best plan changes, smaller where it takes back what the last plan has changed, or gains
@@ -389,7 +386,7 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
         }
     }
     if (self->planned < 2) {
-        memset(hsep_at(self, self->corrected), 0, (size_t)self->n * sizeof(hsep_real));
+        hsep_zero(hsep_at(self, self->corrected), self->n);
     }
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
@@ -683,17 +680,17 @@ HSEP_API int hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hs
 HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best)
 {
     const hsep_predictor *predictor = task->predictor;
-    const size_t late = (size_t)self->late * sizeof(hsep_real);
     const hsep_real *residuals = hsep_at_const(predictor, predictor->past_e) + predictor->n; /* last ones measured */
     hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
     self->place = 0;
     newton_copy(self, rest, hsep_planner_coefficients(task->planner));
-    memcpy(
-        hsep_at(self, self->physics), hsep_at_const(predictor, predictor->physics),
-        (size_t)(self->trial - self->physics) * sizeof(hsep_real));
-    memcpy(hsep_at(self, self->command) + self->preview, hsep_at_const(predictor, predictor->command) + self->Np, late);
-    memcpy(hsep_at(self, self->x_pb) + self->preview, hsep_at_const(predictor, predictor->past_x) + self->Np, late);
-    memcpy(hsep_at(self, self->e_h) + self->preview + self->late, residuals, (size_t)predictor->p * sizeof(hsep_real));
+    hsep_copy(hsep_at(self, self->physics), hsep_at_const(predictor, predictor->physics), self->trial - self->physics);
+    hsep_copy(
+        hsep_at(self, self->command) + self->preview, hsep_at_const(predictor, predictor->command) + self->Np,
+        self->late);
+    hsep_copy(
+        hsep_at(self, self->x_pb) + self->preview, hsep_at_const(predictor, predictor->past_x) + self->Np, self->late);
+    hsep_copy(hsep_at(self, self->e_h) + self->preview + self->late, residuals, predictor->p);
     for (hsep_int k = 0; k < self->preview; k++) {
         path[self->preview - 1 - k] = task->x_d[k] - task->predictor->start;
     }

@@ -267,7 +267,7 @@ static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows
 
 HSEP_API void hsep_planner_may_turn(hsep_planner *self)
 {
-    memset(hsep_at(self, self->moves), 0, (size_t)hsep_planner_splines(self)->preview * sizeof(hsep_real));
+    hsep_zero(hsep_at(self, self->moves), hsep_planner_splines(self)->preview);
 }
 
 HSEP_API void hsep_planner_change(hsep_planner *self)
@@ -324,8 +324,8 @@ static void planner_pin(hsep_planner *self)
         hsep_axpy(v + first, -rest[i], P + (first - i), n - first);
         P += n - i;
     }
-    memmove(v, v + first, (size_t)(n - first) * sizeof(hsep_real));
-    memmove(hsep_planner_quadratic(self), P, (size_t)hsep_triangle(n - first) * sizeof(hsep_real));
+    hsep_copy(v, v + first, n - first);
+    hsep_copy(hsep_planner_quadratic(self), P, (hsep_int)hsep_triangle(n - first));
 }
 
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
@@ -402,11 +402,11 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tole
     const hsep_problem problem = hsep_planner_problem(self);
     hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low, *start = problem.high; /* work */
     hsep_real *factor = hsep_at(self, self->factor);
-    memcpy(factor, row, (size_t)hsep_triangle(n) * sizeof(hsep_real));
+    hsep_copy(factor, row, (hsep_int)hsep_triangle(n));
     if (!hsep_cholesky_rows(factor, n, 0, n, NULL)) {
         return HSEP_PLAN_FAILED;
     }
-    memcpy(free_minimum, v, (size_t)n * sizeof(hsep_real));
+    hsep_copy(free_minimum, v, n);
     hsep_cholesky_solve(factor, n, free_minimum);
     planner_start(self, start);
     hsep_real cost = 0.0, finite = 0.0;
@@ -541,17 +541,16 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     const hsep_splines *splines = hsep_planner_splines(planner);
     hsep_real *plan = hsep_at(planner, planner->c);
     const hsep_int first = HSEP_N_DECIDED + self->shared, rows = HSEP_ORDERS * self->preview;
-    const size_t shared = (size_t)first * sizeof(hsep_real);
     hsep_real *last = hsep_at(self, self->last), *own = hsep_at(self, self->own), *now = hsep_at(self, self->now);
     hsep_real *start = hsep_at(self, self->start), *way = hsep_at(self, self->way);
     hsep_real *own_rows = hsep_at(self, self->own_rows), most = 0.0;
     hsep_real length = 0.0, share = 1.0, too_long = 1.0, tried = 1.0;
-    memcpy(own, last, shared);
+    hsep_copy(own, last, first);
     stop_behind(self, own);
     for (hsep_int i = 0; i < self->count; i++) {
         own[i] = last[i] - own[i];
     }
-    memcpy(now, plan, shared);
+    hsep_copy(now, plan, first);
     stop_behind(self, now);
     stop_rows(self, splines, last, start);
     stop_bounds(self, planner, x_d);
@@ -563,7 +562,7 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
         most = hsep_fmax(most, hsep_fabs(own_rows[r]));
     }
     if (most <= HSEP_STOP_NOTHING) {
-        memset(own_rows, 0, (size_t)rows * sizeof(hsep_real));
+        hsep_zero(own_rows, rows);
     }
     for (int tries = 0; tries < HSEP_STOP_TRIES && length < 1.0; tries++) { /* convex, with the last stop in it */
         const hsep_real found = stop_share(self, tried);

@@ -93,7 +93,7 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
 HSEP_API void hsep_planner_may_turn(hsep_planner *self);
 
 /* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline behind it,
- * (preview,); target: x_d minus its response to x_d plus the decided part of delta, (preview,) m. It costs n preview. */
+ * (preview,); target: x_d minus its response to x_d plus the decided part of delta, (preview,) m. Cost: n preview. */
 HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
 
 /* Open a change of the last plan that ends compensation, with the cost of delta itself, and of its jerk, which makes it

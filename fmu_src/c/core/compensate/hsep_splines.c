@@ -63,7 +63,7 @@ static void splines_change(const hsep_splines *self, const hsep_real c[], hsep_i
     const hsep_real *b = hsep_splines_shape(self);
     const hsep_int spacing = self->spacing, count = self->n - first;
     hsep_int k = first * spacing;
-    memset(delta, 0, (size_t)k * sizeof(hsep_real));
+    hsep_zero(delta, k);
     for (hsep_int place = 0; k < self->preview; place++) { /* between two knots */
         const hsep_int end = k + spacing < self->preview ? k + spacing : self->preview;
         hsep_int within = 0;
@@ -92,7 +92,7 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
     splines_change(self, c, first, rows);
     for (unsigned order = 1; order < HSEP_ORDERS; order++) {
         const hsep_real *of = rows + (order - 1) * preview;
-        memcpy(rows + order * preview, of, (size_t)preview * sizeof(hsep_real));
+        hsep_copy(rows + order * preview, of, preview);
         hsep_axpy(rows + order * preview + 1, -1.0, of, preview - 1);
     }
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
@@ -113,7 +113,7 @@ HSEP_API void hsep_splines_exceeded(
 {
     const hsep_int near = 4 * self->spacing;
     hsep_real now[HSEP_ORDERS];
-    memset(rows, 0, (size_t)count * sizeof(hsep_real));
+    hsep_zero(rows, count);
     hsep_differ_from(now, before);
     for (hsep_int k = 0; k < count; k++) {
         hsep_differ(now, x_d[k]);
@@ -203,7 +203,7 @@ HSEP_API void hsep_splines_gram(
             }
         }
     }
-    memset(products, 0, (size_t)(HSEP_KNOTS_WIDTH * n) * sizeof(hsep_real));
+    hsep_zero(products, HSEP_KNOTS_WIDTH * n);
     for (hsep_int d = 0; d < n && d * self->spacing + 1 < splines_length(self, HSEP_ORDERS - 1); d++) {
         for (hsep_int i = 0; i + d < n; i++) {
             const hsep_int within = i % HSEP_SPLINES_TOGETHER;
@@ -249,7 +249,7 @@ HSEP_API void hsep_splines_jerk(
     const hsep_real *e = splines_differences(self, 3);
     const hsep_int n = self->n - first, length = splines_length(self, 3);
     const hsep_real unit = 1.0 / self->share[3], of_third = weight / self->share[3];
-    memset(products, 0, (size_t)(HSEP_KNOTS_WIDTH * n) * sizeof(hsep_real));
+    hsep_zero(products, HSEP_KNOTS_WIDTH * n);
     for (hsep_int d = 0; d < n && d * self->spacing + 1 < length; d++) {
         hsep_real sum = 0.0;
         for (hsep_int k = d * self->spacing + 1; k < length; k++) {
@@ -306,7 +306,7 @@ HSEP_API hsep_knot hsep_knots_at(const hsep_knots *self, hsep_int i)
 
 HSEP_API void hsep_knots_widen(const hsep_knots *self, const hsep_real x[], hsep_real c[])
 {
-    memset(c, 0, (size_t)self->n * sizeof(hsep_real));
+    hsep_zero(c, self->n);
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_knot knot = hsep_knots_at(self, i);
         hsep_axpy(c + knot.begin, x[i], knot.share, knot.length);
@@ -327,7 +327,7 @@ HSEP_API void hsep_knots_narrow(const hsep_knots *self, const hsep_real g[], hse
 
 HSEP_API void hsep_knots_add(const hsep_knots *self, const hsep_real products[], hsep_real triangle[], hsep_real work[])
 {
-    memset(work, 0, (size_t)(self->n + 2 * HSEP_KNOTS_NEAR) * sizeof(hsep_real));
+    hsep_zero(work, self->n + 2 * HSEP_KNOTS_NEAR);
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_knot row = hsep_knots_at(self, i);
         const hsep_int behind = row.begin + row.length + HSEP_KNOTS_NEAR;
@@ -344,7 +344,7 @@ HSEP_API void hsep_knots_add(const hsep_knots *self, const hsep_real products[],
                 j = column.last;
             }
         }
-        memset(work + row.begin, 0, (size_t)(row.length + 2 * HSEP_KNOTS_NEAR) * sizeof(hsep_real));
+        hsep_zero(work + row.begin, row.length + 2 * HSEP_KNOTS_NEAR);
         triangle += self->m - i;
     }
 }

@@ -37,7 +37,7 @@ static inline void hsep_differ(hsep_real differences[HSEP_ORDERS], hsep_real val
 /* Differences at the last of three samples, from 0. */
 static inline void hsep_differ_from(hsep_real differences[HSEP_ORDERS], const hsep_real before[3])
 {
-    memset(differences, 0, HSEP_ORDERS * sizeof(hsep_real));
+    hsep_zero(differences, HSEP_ORDERS);
     for (int i = 0; i < 3; i++) {
         hsep_differ(differences, before[i]);
     }

@@ -109,7 +109,7 @@ HSEP_API void hsep_physics_begin(hsep_physics *self, const hsep_real state[])
     for (hsep_int i = 0; i < 2 * self->n_modes; i++) {
         physics_modes(self)[i / 2].s[i % 2] = state[i];
     }
-    memcpy(hsep_at(self, self->ring), state + 2 * self->n_modes, (size_t)self->dead_time * sizeof(hsep_real));
+    hsep_copy(hsep_at(self, self->ring), state + 2 * self->n_modes, self->dead_time);
 }
 
 HSEP_API void hsep_physics_add(hsep_physics *self, const hsep_physics *other)
@@ -191,7 +191,7 @@ HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, h
             *command = physics_delay(models[i], *command);
         }
     }
-    memset(x, 0, HSEP_PHYSICS_ABREAST * n * sizeof(hsep_real));
+    hsep_zero(x, HSEP_PHYSICS_ABREAST * n);
     for (hsep_int mode = 0; mode < models[0]->n_modes; mode++) {
         physics_respond_abreast(models, count, mode, u, x, n);
     }

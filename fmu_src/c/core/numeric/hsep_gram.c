@@ -44,7 +44,7 @@ HSEP_API void hsep_gram_settle(hsep_gram *self)
     if (self->waiting == 0) {
         return;
     }
-    memset(x + width * self->waiting, 0, (size_t)(width * (HSEP_GRAM_TOGETHER - self->waiting)) * sizeof(hsep_real));
+    hsep_zero(x + width * self->waiting, width * (HSEP_GRAM_TOGETHER - self->waiting));
     self->waiting = 0;
     for (hsep_int i = 0; i < width; i++, x++) {
         const hsep_int length = width - i;
@@ -74,8 +74,8 @@ HSEP_API void hsep_gram_load(hsep_gram *self, hsep_int i)
 {
     const hsep_int n = self->n;
     hsep_real *row = hsep_gram_row(self);
-    memmove(row + i, row, (size_t)(n + 1 - i) * sizeof(hsep_real));
-    memset(row, 0, (size_t)i * sizeof(hsep_real));
+    hsep_copy(row + i, row, n + 1 - i);
+    hsep_zero(row, i);
     hsep_gram_fold(self);
     if (i == n) {
         hsep_gram_settle(self);

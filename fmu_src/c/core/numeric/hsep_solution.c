@@ -82,7 +82,7 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
     hsep_solution_reset(self);
     self->begun = 1;
     self->square = 0.0;
-    memset(diagonal, 0, (size_t)hsep_triangle(n + 1) * sizeof(hsep_real));
+    hsep_zero(diagonal, (hsep_int)hsep_triangle(n + 1));
     solution_add(self, gram, 1.0);
     if (other != NULL) {
         solution_add(self, other, weight);
@@ -109,7 +109,7 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
     for (hsep_int i = 0; i < n_head; i++) {
         to[i] = row[n_tail + n_head - 1 - i];
     }
-    memcpy(to + n_head, row, (size_t)n_tail * sizeof(hsep_real));
+    hsep_copy(to + n_head, row, n_tail);
     to[n] = target;
     self->square += target * target;
     self->waiting++;
@@ -140,10 +140,9 @@ HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, 
             const hsep_int count = waiting < HSEP_SOLUTION_ABREAST ? waiting : HSEP_SOLUTION_ABREAST;
             amount -= (hsep_real)count * solution_of_row(self, self->factored);
             self->waiting -= count;
-            memcpy(
-                work, hsep_at(self, self->rows) + width * self->waiting, (size_t)(width * count) * sizeof(hsep_real));
+            hsep_copy(work, hsep_at(self, self->rows) + width * self->waiting, width * count);
             if (count > 1) { /* with rows of 0 in the place of those that are not there */
-                memset(work + width * count, 0, (size_t)(width * (HSEP_SOLUTION_ABREAST - count)) * sizeof(hsep_real));
+                hsep_zero(work + width * count, width * (HSEP_SOLUTION_ABREAST - count));
                 hsep_cholesky_take_four(factor, width, self->factored, work);
             } else {
                 hsep_cholesky_take_one(factor, width, self->factored, work);
@@ -167,15 +166,15 @@ HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, 
 static void solution_complete(hsep_solution *self)
 {
     const hsep_int n_head = self->n_head, n_tail = self->n_tail;
-    const size_t size = (size_t)hsep_triangle(n_tail + 1) * sizeof(hsep_real);
+    const hsep_int size = (hsep_int)hsep_triangle(n_tail + 1);
     const hsep_real *penalties = hsep_at(self, self->penalties);
     hsep_real *tail = solution_tail(self), *left = hsep_at(self, self->left), *diagonal = tail;
     hsep_real *least = hsep_at(self, self->least) + n_head;
     if (!self->finished) {
         (void)hsep_solution_advance(self, 0.0, 1);
-        memcpy(left, tail, size);
+        hsep_copy(left, tail, size);
     } else {
-        memcpy(tail, left, size);
+        hsep_copy(tail, left, size);
     }
     for (hsep_int i = 0; i < n_tail; i++) {
         *diagonal += penalties[i];
@@ -199,7 +198,7 @@ HSEP_API hsep_real hsep_solution_finish(hsep_solution *self)
     }
     hsep_real sum = *row * *row;
     hsep_cholesky_backward(hsep_at(self, self->factor), n + 1, n, x);
-    memcpy(w, x + n_head, (size_t)n_tail * sizeof(hsep_real));
+    hsep_copy(w, x + n_head, n_tail);
     for (hsep_int i = 0; i < n_head; i++) {
         w[n_tail + i] = x[n_head - 1 - i];
     }

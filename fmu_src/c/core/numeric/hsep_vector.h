@@ -40,6 +40,13 @@ static inline hsep_real hsep_largest(hsep_lanes a) { return a; }
 static inline hsep_lanes *hsep_lanes_at(hsep_real *a) { return (hsep_lanes *)(void *)a; }
 static inline const hsep_lanes *hsep_lanes_const(const hsep_real *a) { return (const hsep_lanes *)(const void *)a; }
 
+/* to := from, n words, which may overlap; return to. */
+static inline void *hsep_copy(void *to, const void *from, hsep_int n)
+{
+    return memmove(to, from, (size_t)n * sizeof(hsep_real));
+}
+static inline void hsep_zero(hsep_real to[], hsep_int n) { memset(to, 0, (size_t)n * sizeof(hsep_real)); }
+
 /* sum_i a_i b_i, both (n,). */
 static inline hsep_real hsep_dot(const hsep_real a[], const hsep_real b[], hsep_int n)
 {

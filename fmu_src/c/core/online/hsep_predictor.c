@@ -161,8 +161,8 @@ HSEP_API void hsep_predictor_finish(hsep_predictor *self)
         const hsep_real *accepted = averaged != NULL ? hsep_at(averaged, averaged->accepted) : NULL; /* all */
         hsep_uncertainty_learn(hsep_predictor_uncertainty(self), past_e + late, accepted);
     }
-    memcpy(past_x + n, past_x + late, (size_t)self->q * sizeof(hsep_real)); /* q < Np, p <= Np: they do not overlap */
-    memcpy(past_e + n, past_e + late, (size_t)self->p * sizeof(hsep_real));
+    hsep_copy(past_x + n, past_x + late, self->q); /* q < Np, p <= Np: they do not overlap */
+    hsep_copy(past_e + n, past_e + late, self->p);
 }
 
 HSEP_API void hsep_predictor_begin(hsep_predictor *self)
@@ -174,18 +174,18 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     /* The samples of the last window that are not measured yet go before this one. */
     const hsep_int newest_first[2] = {self->command, self->past_x};
     const hsep_int oldest_first[4] = {self->x_d, self->x_pb, self->x_h, self->x_hold};
-    const size_t late = (size_t)self->late * sizeof(hsep_real);
     for (int i = 0; i < 2; i++) {
-        memmove(hsep_at(self, newest_first[i] + self->Np), hsep_at(self, newest_first[i]), late);
+        hsep_real *late = hsep_at(self, newest_first[i] + self->Np);
+        hsep_copy(late, late - self->Np, self->late);
     }
     for (int i = 0; i < 4; i++) {
-        memmove(
-            hsep_at(self, oldest_first[i] - self->late), hsep_at(self, oldest_first[i] - self->late + self->Np), late);
+        hsep_real *late = hsep_at(self, oldest_first[i] - self->late);
+        hsep_copy(late, late + self->Np, self->late);
     }
-    memcpy(x_d, ahead + oldest, (size_t)newest * sizeof(hsep_real));
-    memcpy(x_d + newest, ahead, (size_t)oldest * sizeof(hsep_real));
+    hsep_copy(x_d, ahead + oldest, newest);
+    hsep_copy(x_d + newest, ahead, oldest);
     if (e_h != past_e) {
-        memcpy(e_h + n, past_e + n, (size_t)self->p * sizeof(hsep_real));
+        hsep_copy(e_h + n, past_e + n, self->p);
     }
     self->learning = self->k >= self->preview; /* the first fill is not learned */
     if (averaged == NULL) {                    /* the weights, eq. (6) */
@@ -286,7 +286,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hs
     }
     hsep_predictor_finish(self);
     if (self->k == self->preview) { /* the first fill was not predicted */
-        memset(hsep_at(self, self->past_e), 0, (size_t)(self->n + self->p) * sizeof(hsep_real));
+        hsep_zero(hsep_at(self, self->past_e), self->n + self->p);
     }
     hsep_predictor_begin(self);
     /* Commands and x_pb as they came, eq. (2), behind the late samples' values */

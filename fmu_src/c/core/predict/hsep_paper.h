@@ -62,8 +62,8 @@ static inline void hsep_paper_learn(hsep_paper *self, const hsep_real x[], const
 {
     hsep_real *row = hsep_regression_row(hsep_paper_regression(self)), *lags = row + 2 + self->q;
     row[0] = 1.0;
-    memcpy(row + 1, x, (size_t)(self->q + 1) * sizeof(hsep_real));
-    memcpy(lags, e + 1, (size_t)self->p * sizeof(hsep_real));
+    hsep_copy(row + 1, x, self->q + 1);
+    hsep_copy(lags, e + 1, self->p);
     row[self->features] = e[0]; /* its target e_pb(k) */
     hsep_regression_fold(hsep_paper_regression(self));
 }

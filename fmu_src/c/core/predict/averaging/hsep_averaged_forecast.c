@@ -244,11 +244,11 @@ HSEP_API void hsep_averaged_keep_ahead(hsep_averaged *self, int is_known)
 {
     const hsep_int Np = self->Np, count = HSEP_N_EXPERTS * Np, last = self->n_ahead - 1;
     hsep_real *ahead = hsep_at(self, self->ahead);
-    memmove(ahead, ahead + count, (size_t)(last * count) * sizeof(hsep_real));
+    hsep_copy(ahead, ahead + count, last * count);
     ahead += last * count;
     for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         const hsep_real *stacked = hsep_at(self, self->stacked) + i * self->n + (self->n - self->n_ahead * Np);
-        memcpy(ahead + i * Np, stacked, (size_t)Np * sizeof(hsep_real));
+        hsep_copy(ahead + i * Np, stacked, Np);
     }
     if (!is_known) {
         ahead[0] = (hsep_real)NAN;
@@ -264,7 +264,7 @@ HSEP_API void hsep_averaged_forecast(
     self->bound = HSEP_AVERAGING_BOUND * self->learned.scales[HSEP_MODEL_RESIDUAL].largest;
     self->growth = before > 0.0 ? hsep_fmin(self->forecast_step / before, HSEP_AVERAGING_VELOCITY_JUMP) : 1.0;
     averaged_solve(self, outgrown);
-    memset(hsep_at(self, self->stacked), 0, (size_t)(HSEP_N_EXPERTS * self->n) * sizeof(hsep_real));
+    hsep_zero(hsep_at(self, self->stacked), HSEP_N_EXPERTS * self->n);
     averaged_recall(self, e[self->n]);
     averaged_begin(self, e + self->n);
     hsep_averaged_go_on(self, x_pb, e, 0, last, 1); /* the scales left the rows at x_pb */

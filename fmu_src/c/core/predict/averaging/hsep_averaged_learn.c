@@ -45,9 +45,7 @@ static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], co
     for (hsep_int j = self->Np; j-- > 0; before = x_pb[j]) {
         learned->fastest = hsep_fmax(learned->fastest, hsep_fabs(x_pb[j] - before));
     }
-    memcpy(
-        hsep_at(self, self->largest), hsep_at(self, self->forecast_largest),
-        (size_t)self->n_static * sizeof(hsep_real));
+    hsep_copy(hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), self->n_static);
     hsep_gate_begin(&self->reach, learned->scales[HSEP_MODEL_RESIDUAL].largest, learned->fastest);
     hsep_command_take(command, x_d, self->Np);
     if (self->n > self->Np) { /* what was tried last went beyond the window */
@@ -84,8 +82,8 @@ static void averaged_fold(hsep_averaged *self, hsep_int kind, hsep_int k, const 
     const hsep_int n_static = gram->n - p;
     const hsep_real *lags = e + (self->Np - k);
     hsep_real *to = hsep_gram_row(gram);
-    memcpy(to, rows + k * n_static, (size_t)n_static * sizeof(hsep_real));
-    memcpy(to + n_static, lags, (size_t)p * sizeof(hsep_real));
+    hsep_copy(to, rows + k * n_static, n_static);
+    hsep_copy(to + n_static, lags, p);
     to[gram->n] = lags[-1];
     /* Behind early samples the next solutions may have begun. */
     for (hsep_int i = HSEP_REGRESSIONS; k >= self->early && i < HSEP_REGRESSIONS_END; i++) {
@@ -257,7 +255,7 @@ static void averaged_judge_stacks(hsep_averaged *self, const hsep_real e[])
     }
     if (hsep_within(ahead, HSEP_N_EXPERTS * self->Np, HSEP_PREDICTION_MAX)) { /* it was known */
         if (!hsep_averaged_doubts(self)) {                                    /* and is not forgotten since */
-            memset(ahead + HSEP_FRESH_START * self->Np, 0, (size_t)self->Np * sizeof(hsep_real));
+            hsep_zero(ahead + HSEP_FRESH_START * self->Np, self->Np);
         }
         hsep_stack_add(&products, signals, accepted, work, self->Np);
     }
@@ -327,6 +325,6 @@ HSEP_API void hsep_averaged_learn(
         averaged_judge(self, e);
     }
     hsep_command_end(hsep_averaged_command(self), self->Np);
-    memmove(e_0 + self->Np, e_0, HSEP_AVERAGING_LAGS_OF_COMMAND * sizeof(hsep_real));
+    hsep_copy(e_0 + self->Np, e_0, HSEP_AVERAGING_LAGS_OF_COMMAND);
     self->followed = self->known = 0;
 }

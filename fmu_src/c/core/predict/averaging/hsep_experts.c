@@ -132,7 +132,7 @@ static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_int
         for (hsep_int i = 0; i < p; i++) {
             to[p - 1 - i] = lags[i];
         }
-        memcpy(to + p, rows + sample * n_static, (size_t)n_static * sizeof(hsep_real));
+        hsep_copy(to + p, rows + sample * n_static, n_static);
     }
     hsep_solution_leverages(solution, count, leverages);
     for (hsep_int c = 0; c < apart * count && k + c < last; c++) {
@@ -165,8 +165,8 @@ HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_
 {
     self->largest_square = largest_square;
     self->bound = bound;
-    memcpy(hsep_at(self, self->run) + self->n, past, (size_t)self->p * sizeof(hsep_real));
-    memcpy(hsep_at(self, self->unshrunk) + self->n, past, (size_t)self->p * sizeof(hsep_real));
+    hsep_copy(hsep_at(self, self->run) + self->n, past, self->p);
+    hsep_copy(hsep_at(self, self->unshrunk) + self->n, past, self->p);
 }
 
 HSEP_API void hsep_expert_predict(

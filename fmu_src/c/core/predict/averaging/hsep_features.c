@@ -90,9 +90,9 @@ static void disturbances_filter_samples(
 /* Begin with the filters first ... last - 1 as they were before the window. */
 static void disturbances_rewind(hsep_disturbances *self, hsep_int first, hsep_int last)
 {
-    memcpy(
+    hsep_copy(
         disturbances_filter(self, self->count + first), disturbances_filter(self, first),
-        (size_t)((last - first) * self->filter_words) * sizeof(hsep_real));
+        (last - first) * self->filter_words);
     for (hsep_int i = first; i < last; i++) {
         self->after.filtered[i] = self->before.filtered[i];
     }
@@ -155,7 +155,7 @@ static void disturbances_of_command(
     hsep_disturbances *self, const hsep_real steps[], hsep_int n, hsep_real velocity_scale, hsep_real rows[])
 {
     hsep_real u[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
-    memset(u, 0, HSEP_PHYSICS_ABREAST * n * sizeof *u); /* places without a disturbance are filtered, too */
+    hsep_zero(u, HSEP_PHYSICS_ABREAST * n); /* places without a disturbance are filtered, too */
     for (hsep_int first = 0; first < HSEP_DISTURBANCES_OF_COMMAND; first += HSEP_PHYSICS_ABREAST) {
         const hsep_int left = HSEP_DISTURBANCES_OF_COMMAND - first;
         const hsep_int count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
@@ -217,7 +217,7 @@ HSEP_API void hsep_disturbances_motion(
     const hsep_real s = hsep_sin(hsep_disturbances_angle(self, 0.0)), c = hsep_cos(hsep_disturbances_angle(self, 0.0));
     hsep_real disturbances[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
     const hsep_int most = last - first < DISTURBANCES_TOGETHER ? last - first : DISTURBANCES_TOGETHER;
-    memset(disturbances, 0, HSEP_PHYSICS_ABREAST * most * sizeof *disturbances); /* as with friction */
+    hsep_zero(disturbances, HSEP_PHYSICS_ABREAST * most); /* as with friction */
     if (first == 0) {
         disturbances_rewind(self, HSEP_DISTURBANCES_STIFFNESS, self->count);
     }
@@ -244,9 +244,7 @@ HSEP_API void hsep_disturbances_motion(
 
 HSEP_API void hsep_disturbances_end(hsep_disturbances *self)
 {
-    memcpy(
-        disturbances_filter(self, 0), disturbances_filter(self, self->count),
-        (size_t)(self->count * self->filter_words) * sizeof(hsep_real));
+    hsep_copy(disturbances_filter(self, 0), disturbances_filter(self, self->count), self->count * self->filter_words);
     self->before = self->after;
 }
 
@@ -279,7 +277,7 @@ HSEP_API void hsep_command_fill(hsep_command *self, hsep_int m, hsep_int first, 
 HSEP_API void hsep_command_end(hsep_command *self, hsep_int m)
 {
     hsep_real *before = hsep_at(self, self->commands) + self->n;
-    memmove(before, before - m, (size_t)self->n_before * sizeof(hsep_real));
+    hsep_copy(before, before - m, self->n_before);
 }
 
 HSEP_API void hsep_command_begin_in_motion(hsep_command *self, hsep_real first, hsep_real second)

@@ -127,7 +127,7 @@ HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_predictor
 /* Take in the commands of the m samples that come next, (m,), m, m <= n; may be tried again with others. */
 static inline void hsep_command_take(hsep_command *self, const hsep_real x_d[], hsep_int m)
 {
-    memcpy(hsep_at(self, self->commands) + (self->n - m), x_d, (size_t)m * sizeof(hsep_real));
+    hsep_copy(hsep_at(self, self->commands) + (self->n - m), x_d, m);
 }
 
 /* Fill the rows of samples first ... last - 1 of these. */

@@ -132,7 +132,7 @@ static inline hsep_real hsep_recall_forecast(const hsep_recall *self, hsep_real 
     const hsep_real *residuals = hsep_at_const(self, self->residuals);
     const hsep_real tolerated = HSEP_AVERAGING_RECALL_TOLERANCE * HSEP_AVERAGING_RECALL_TOLERANCE * self->moved;
     const hsep_int n = self->n, lag = self->lag;
-    memset(recalled, 0, (size_t)n * sizeof(hsep_real));
+    hsep_zero(recalled, n);
     if (self->size <= self->n) {
         return 0.0;
     }

@@ -113,7 +113,7 @@ static inline void stack_minimise(
 {
     stack_support support = {{0}, {{0.0}}, {0.0}, {0.0}, {0.0}, {0.0}, {0.0}};
     hsep_real least = 0.0;
-    memset(weights, 0, HSEP_N_EXPERTS * sizeof *weights);
+    hsep_zero(weights, HSEP_N_EXPERTS);
     for (unsigned set = 1; set < 1U << HSEP_N_EXPERTS; set++) {
         int n = 0;
         for (int i = HSEP_N_EXPERTS; i-- > 0;) {
@@ -199,7 +199,7 @@ static inline hsep_int hsep_stack_leader(const hsep_stack *self)
 /* Give an expert the evidence of another, as if it had predicted the same so far. */
 static inline void hsep_stack_copy(hsep_stack *self, hsep_int expert, hsep_int to)
 {
-    memcpy(self->gram + HSEP_N_EXPERTS * to, self->gram + HSEP_N_EXPERTS * expert, HSEP_N_EXPERTS * sizeof(hsep_real));
+    hsep_copy(self->gram + HSEP_N_EXPERTS * to, self->gram + HSEP_N_EXPERTS * expert, HSEP_N_EXPERTS);
     for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         self->gram[HSEP_N_EXPERTS * i + to] = self->gram[HSEP_N_EXPERTS * i + expert];
     }

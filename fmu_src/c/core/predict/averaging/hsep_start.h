@@ -131,7 +131,7 @@ static inline int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], c
         return 0;
     }
     for (hsep_int i = 0; i < self->n_states; i++) {
-        memset(state, 0, (size_t)all * sizeof(hsep_real));
+        hsep_zero(state, all);
         state[i] = 1.0;
         start_respond(self, 0.0, hsep_at(self, self->responses) + i * self->n, self->n);
     }
