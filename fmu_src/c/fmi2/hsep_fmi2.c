@@ -118,10 +118,7 @@ fmi2Status fmi2SetupExperiment(
     HSEP_DO(fmi2, SetupExperiment, c, hsep_call_experiment(self, call, startTime, stopTimeDefined, stopTime));
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component c)
-{
-    HSEP_DO(fmi2, EnterInitializationMode, c, hsep_call_phase(self, HSEP_INITIALIZATION));
-}
+HSEP_FUNCTION(fmi2, EnterInitializationMode, hsep_call_phase(self, HSEP_INITIALIZATION), fmi2Component c)
 
 fmi2Status fmi2DoStep(
     fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
@@ -147,15 +144,12 @@ FMI2_ACCESS(Integer, hsep_values_integer(number), (double)number)
 FMI2_ACCESS(Boolean, number != 0.0, number ? 1.0 : 0.0)
 
 /* There are no variables of type String: with references, the access is refused by name. */
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
-{
-    HSEP_DO(fmi2, GetString, c, hsep_call_access(self, call, vr, nvr, value, nvr));
-}
-
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
-{
-    HSEP_DO(fmi2, SetString, c, hsep_call_access(self, call, vr, nvr, value, nvr));
-}
+HSEP_FUNCTION(
+    fmi2, GetString, hsep_call_access(self, call, vr, nvr, value, nvr), fmi2Component c, const fmi2ValueReference vr[],
+    size_t nvr, fmi2String value[])
+HSEP_FUNCTION(
+    fmi2, SetString, hsep_call_access(self, call, vr, nvr, value, nvr), fmi2Component c, const fmi2ValueReference vr[],
+    size_t nvr, const fmi2String value[])
 
 /* The derivatives count only for the next step. Like the values, none is taken if one is refused. */
 static hsep_status fmi2_set_derivatives(
@@ -200,7 +194,7 @@ fmi2Status fmi2SetRealInputDerivatives(
     HSEP_DO(fmi2, SetRealInputDerivatives, c, fmi2_set_derivatives(self, &access, order, value));
 }
 
-fmi2Status fmi2CancelStep(fmi2Component c) { HSEP_DO(fmi2, CancelStep, c, HSEP_REFUSED); }
+HSEP_FUNCTION(fmi2, CancelStep, HSEP_REFUSED, fmi2Component c)
 
 /* Refuse a call for what modelDescription.xml says. */
 #define FMI2_ABSENT(function, c, why) \

@@ -134,19 +134,13 @@ fmi3Instance fmi3InstantiateCoSimulation(
 
 HSEP_COMMON_FUNCTIONS(fmi3, Instance, FMUState, Deserialize)
 
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
-{
-    HSEP_DO(
-        fmi3, EnterConfigurationMode, instance,
-        self->context.window > 0
-            ? hsep_call_phase(self, HSEP_CONFIGURATION)
-            : hsep_refuse(self, "%s: there is no structural parameter in modelDescription.xml", call->name));
-}
-
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance)
-{
-    HSEP_DO(fmi3, ExitConfigurationMode, instance, hsep_call_phase(self, HSEP_INSTANTIATED));
-}
+HSEP_FUNCTION(
+    fmi3, EnterConfigurationMode,
+    self->context.window > 0
+        ? hsep_call_phase(self, HSEP_CONFIGURATION)
+        : hsep_refuse(self, "%s: there is no structural parameter in modelDescription.xml", call->name),
+    fmi3Instance c)
+HSEP_FUNCTION(fmi3, ExitConfigurationMode, hsep_call_phase(self, HSEP_INSTANTIATED), fmi3Instance c)
 
 fmi3Status fmi3EnterInitializationMode(
     fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance, fmi3Float64 startTime,
@@ -226,11 +220,9 @@ fmi3Status fmi3SetUInt64(
 
 /* Access to types that no variable has: with references, it is refused by name. */
 #define FMI3_REFUSED(name, c_type) \
-    fmi3Status fmi3##name( \
-        fmi3Instance instance, const fmi3ValueReference references[], size_t n, c_type values[], size_t n_values) \
-    { \
-        HSEP_DO(fmi3, name, instance, hsep_call_access(self, call, references, n, values, n_values)); \
-    }
+    HSEP_FUNCTION( \
+        fmi3, name, hsep_call_access(self, call, references, n, values, n_values), fmi3Instance c, \
+        const fmi3ValueReference references[], size_t n, c_type values[], size_t n_values)
 #define FMI3_NO_VARIABLE(type) \
     FMI3_REFUSED(Get##type, fmi3##type) \
     FMI3_REFUSED(Set##type, const fmi3##type)

@@ -69,13 +69,10 @@ static void newton_command(hsep_newton *self, const hsep_newton_task *task, cons
  * in their largest change from sample to sample over the plan and the late samples. */
 static int newton_outgrows(hsep_newton *self, const hsep_newton_task *task)
 {
-    const hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
-    hsep_real of_command = 0.0, of_model = 0.0;
+    const hsep_int n = self->preview + self->late;
     newton_command(self, task, hsep_at(self, self->rest), 0);
-    for (hsep_int j = 1; j < self->preview + self->late; j++) {
-        of_command = hsep_fmax(of_command, hsep_fabs(command[j - 1] - command[j]));
-        of_model = hsep_fmax(of_model, hsep_fabs(x_pb[j - 1] - x_pb[j]));
-    }
+    const hsep_real of_command = hsep_largest_step(hsep_at(self, self->command), n);
+    const hsep_real of_model = hsep_largest_step(hsep_at(self, self->x_pb), n);
     return !(hsep_fmin(of_command, of_model) <= HSEP_PLANNING_FASTER * task->model->learned.fastest);
 }
 

@@ -1,3 +1,4 @@
+/* What a predictor has learned, read and written; its size, and its beginning with it. */
 #include "hsep_learned.h"
 
 #include "hsep_cholesky.h"
@@ -72,19 +73,14 @@ static int learned_take_factor(hsep_learned_bytes *from, hsep_predictor *predict
     hsep_real n_rows = 0.0;
     int taken = learned_numbers(from, &n_rows, 1);
     for (hsep_int i = 0; taken && i <= n; i++) {
+        taken = learned_numbers(from, gram != NULL ? hsep_gram_row(gram) : hsep_regression_row(regression), n + 1 - i);
         if (gram != NULL) {
-            taken = learned_numbers(from, hsep_gram_row(gram), n + 1 - i);
             hsep_gram_load(gram, i);
         } else {
-            taken = learned_numbers(from, hsep_regression_row(regression), n + 1 - i);
             hsep_regression_load(regression, i);
         }
     }
-    if (gram != NULL) {
-        gram->n_rows = n_rows;
-    } else {
-        regression->n_rows = n_rows;
-    }
+    *(gram != NULL ? &gram->n_rows : &regression->n_rows) = n_rows;
     return taken;
 }
 
@@ -272,4 +268,25 @@ hsep_predictor_weights(hsep_predictor *self, const hsep_parameters *parameters, 
     const uint64_t sum = hsep_crc(bytes, needed - sizeof sum);
     memcpy(to, &sum, sizeof sum);
     return needed;
+}
+
+HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters)
+{
+    if (hsep_predictor_refused(parameters) != NULL) {
+        return 0;
+    }
+    const hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
+    return hsep_block_bytes(hsep_predictor_lay_out(&(hsep_predictor){0}, &derived));
+}
+
+HSEP_API hsep_began hsep_predictor_init(
+    hsep_predictor *self, const hsep_parameters *parameters, hsep_real start, const void *weights, size_t weights_size)
+{
+    const hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
+    hsep_predictor_block_init(self, &derived, start);
+    const hsep_began began = hsep_learned_load(self, parameters, weights, weights_size);
+    if (began != HSEP_BEGAN) {
+        hsep_predictor_block_init(self, &derived, start);
+    }
+    return began;
 }

@@ -1,4 +1,4 @@
-/* The library's compensator: its size and beginning from the settings; the rest is hsep_compensator.c's. */
+/* The library's compensator: its size and beginning from the settings; its predictor has the weights. */
 #include "hsep_compensator.h"
 #include "hsep_learned.h"
 

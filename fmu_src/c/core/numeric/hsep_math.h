@@ -40,6 +40,16 @@ static inline int hsep_within(const hsep_real a[], hsep_int n, hsep_real limit)
     return within;
 }
 
+/* Largest change from one entry of a to the next, (n,). */
+static inline hsep_real hsep_largest_step(const hsep_real a[], hsep_int n)
+{
+    hsep_real largest = 0.0;
+    for (hsep_int i = 1; i < n; i++) {
+        largest = hsep_fmax(largest, hsep_fabs(a[i - 1] - a[i]));
+    }
+    return largest;
+}
+
 /* A value within +- bound; bound if it is not a number. */
 static inline hsep_real hsep_clip(hsep_real value, hsep_real bound)
 {

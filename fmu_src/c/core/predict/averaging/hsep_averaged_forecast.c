@@ -13,11 +13,8 @@ static int averaged_outgrown(hsep_averaged *self, const hsep_real x_d[], const h
     hsep_real most = HSEP_AVERAGING_VELOCITY_JUMP * hsep_fmax(n_windows, 1.0) * before;
     self->forecast_step = hsep_fmax(self->learned.largest_step, peak * self->T_s);
     if (path != NULL && hsep_warm_start_n_rows(evidence) == 0.0) {
-        peak = 0.0;
-        for (hsep_int j = 0; j + 1 < n_path; j++) {
-            peak = hsep_fmax(peak, hsep_fabs(path[j] - path[j + 1]));
-        }
-        peak = hsep_fmax(hsep_disturbances_resolved(disturbances, peak) / self->T_s, before);
+        const hsep_real step = hsep_disturbances_resolved(disturbances, hsep_largest_step(path, n_path));
+        peak = hsep_fmax(step / self->T_s, before);
         most = before;
     }
     const int outgrown = peak > hsep_fmax(most, HSEP_FEATURES_LEAST_VELOCITY);

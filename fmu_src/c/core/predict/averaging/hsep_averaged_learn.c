@@ -27,7 +27,7 @@ static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], co
     hsep_disturbances *disturbances = hsep_averaged_disturbances(self);
     hsep_command *command = hsep_averaged_command(self);
     hsep_learned *learned = &self->learned;
-    hsep_real before = disturbances->before.x_pb[0];
+    const hsep_real first = hsep_fabs(x_pb[self->Np - 1] - disturbances->before.x_pb[0]);
     if (self->forecast_scale != learned->velocity_scale) {
         hsep_warm_start_forget(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL));
         hsep_warm_start_believe_earlier(hsep_averaged_evidence(self, HSEP_COMMAND_RESIDUAL));
@@ -42,9 +42,7 @@ static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], co
     }
     learned->velocity_scale = self->forecast_scale;
     learned->largest_step = self->forecast_step;
-    for (hsep_int j = self->Np; j-- > 0; before = x_pb[j]) {
-        learned->fastest = hsep_fmax(learned->fastest, hsep_fabs(x_pb[j] - before));
-    }
+    learned->fastest = hsep_fmax(learned->fastest, hsep_fmax(first, hsep_largest_step(x_pb, self->Np)));
     hsep_copy(hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), self->n_static);
     hsep_gate_begin(&self->reach, learned->scales[HSEP_MODEL_RESIDUAL].largest, learned->fastest);
     hsep_command_take(command, x_d, self->Np);

@@ -8,21 +8,24 @@ static hsep_int averaged_n_features(const hsep_averaged *self, hsep_int kind)
                                          : self->n_static + self->p;
 }
 
-static hsep_expert_shape averaged_shape(const hsep_averaged *self, hsep_int expert)
+/* Shape of an expert: as hsep_expert_lay_out has it. */
+static hsep_expert averaged_shape(const hsep_averaged *self, hsep_int expert)
 {
-    const hsep_int room = self->Np - self->early + HSEP_GRAM_TOGETHER;
-    if (hsep_averaged_kind_of(self, expert) == HSEP_COMMAND_RESIDUAL) {
-        return (hsep_expert_shape){self->Np, self->n, HSEP_COMMAND_FEATURES, HSEP_AVERAGING_LAGS_OF_COMMAND, room};
-    }
-    return (hsep_expert_shape){self->Np, self->n, self->n_static, hsep_expert_of(expert).has_lags ? self->p : 0, room};
+    const int of_command = hsep_averaged_kind_of(self, expert) == HSEP_COMMAND_RESIDUAL;
+    const hsep_int p = hsep_expert_of(expert).has_lags ? self->p : 0;
+    return (hsep_expert){
+        .Np = self->Np,
+        .n = self->n,
+        .n_static = of_command ? HSEP_COMMAND_FEATURES : self->n_static,
+        .p = of_command ? HSEP_AVERAGING_LAGS_OF_COMMAND : p};
 }
 
 /* Bytes of the block of an expert, whichever it is the counterpart of. */
 static hsep_real averaged_expert_size(const hsep_averaged *self, hsep_int expert)
 {
-    const hsep_expert_shape shape = averaged_shape(self, expert), other = averaged_shape(self, HSEP_ARX_COMMAND);
-    const hsep_real size = hsep_expert_lay_out(&(hsep_expert){0}, &shape);
-    return hsep_expert_of(expert).is_fresh ? hsep_fmax(size, hsep_expert_lay_out(&(hsep_expert){0}, &other)) : size;
+    hsep_expert shape = averaged_shape(self, expert), other = averaged_shape(self, HSEP_ARX_COMMAND);
+    const hsep_real size = hsep_expert_lay_out(&shape);
+    return hsep_expert_of(expert).is_fresh ? hsep_fmax(size, hsep_expert_lay_out(&other)) : size;
 }
 
 HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_predictor_parameters *parameters)
@@ -37,7 +40,7 @@ HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_predict
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(parameters);
     self->late = hsep_late(settings);
-    self->early = self->Np - (self->Np / 2 < HSEP_AVERAGING_AHEAD ? self->Np / 2 : HSEP_AVERAGING_AHEAD);
+    self->early = self->Np - hsep_expert_ahead(self->Np);
     self->T_s = settings->T_s;
     self->least_variance = settings->lambda;
     self->effect = averaging->effect;
@@ -88,8 +91,7 @@ HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_predictor_param
         hsep_warm_start_init(hsep_averaged_evidence(self, i), averaged_n_features(self, i));
     }
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
-        const hsep_expert_shape shape = averaged_shape(self, i);
-        hsep_expert_init(hsep_averaged_expert(self, i), &shape);
+        hsep_expert_init(hsep_averaged_expert(self, i), averaged_shape(self, i));
         self->learned.errors[i - HSEP_REGRESSIONS].correlation = 1.0;
     }
 }
@@ -139,8 +141,7 @@ HSEP_API void hsep_averaged_restart(hsep_averaged *self)
             hsep_averaged_evidence(self, i), HSEP_AVERAGING_WARM_WINDOWS_MAX * (hsep_real)self->Np);
     }
     self->leading = hsep_stack_leader(&learned->stacks[HSEP_OF_PREDICTIONS]);
-    const hsep_expert_shape shape = averaged_shape(self, HSEP_FRESH_START);
-    hsep_expert_init(hsep_averaged_expert(self, HSEP_FRESH_START), &shape);
+    hsep_expert_init(hsep_averaged_expert(self, HSEP_FRESH_START), averaged_shape(self, HSEP_FRESH_START));
     *doubting = (hsep_expert_errors){0.0, 1.0};
     self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = 0;
     self->reach.farthest = 0.0;

@@ -1,7 +1,5 @@
 #include "hsep_experts.h"
 
-#include "hsep_predict_constants.h"
-
 HSEP_API void hsep_residual_scale_follow(
     hsep_residual_scale *self, const hsep_real residuals[], const hsep_real accepted[], hsep_int n, hsep_real count,
     hsep_real level)
@@ -23,14 +21,13 @@ HSEP_API hsep_real hsep_residual_scale_effect(const hsep_residual_scale *self)
     return hsep_sqrt(hsep_fmin(hsep_fmax(HSEP_EXPERTS_MOVES * self->largest_move, least), square));
 }
 
-HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape)
+/* Rows that may wait in its solution. */
+static hsep_int expert_room(hsep_int Np) { return hsep_expert_ahead(Np) + HSEP_GRAM_TOGETHER; }
+
+HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *self)
 {
-    const hsep_real window = (hsep_real)shape->n, lags = (hsep_real)shape->p;
+    const hsep_real window = (hsep_real)self->n, lags = (hsep_real)self->p;
     hsep_real end = HSEP_WORDS(hsep_expert);
-    self->Np = shape->Np;
-    self->n = shape->n;
-    self->n_static = shape->n_static;
-    self->p = shape->p;
     self->lag_scales = hsep_take(&end, lags);
     self->run = hsep_take(&end, window + lags);
     self->unshrunk = hsep_take(&end, window + lags);
@@ -39,15 +36,15 @@ HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *self, const hsep_expert_shap
     self->response = hsep_take(&end, window + lags);
     self->squares = hsep_take(&end, window);
     self->variances = hsep_take(&end, window);
-    self->solution = hsep_take_block(&end, hsep_solution_size(shape->p, shape->n_static, shape->room));
+    self->solution = hsep_take_block(&end, hsep_solution_size(self->p, self->n_static, expert_room(self->Np)));
     return end * sizeof(hsep_real);
 }
 
-HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape)
+HSEP_API void hsep_expert_init(hsep_expert *self, hsep_expert shape)
 {
-    memset(self, 0, (size_t)hsep_expert_lay_out(self, shape));
-    (void)hsep_expert_lay_out(self, shape);
-    hsep_solution_init(hsep_expert_solution(self), shape->p, shape->n_static, shape->room);
+    memset(self, 0, (size_t)hsep_expert_lay_out(&shape));
+    *self = shape;
+    hsep_solution_init(hsep_expert_solution(self), self->p, self->n_static, expert_room(self->Np));
     for (hsep_int i = 0; i < self->p; i++) {
         hsep_at(self, self->lag_scales)[i] =
             hsep_sqrt(hsep_pow(HSEP_AVERAGING_LAST_LAG, (hsep_real)i / (hsep_real)self->p));

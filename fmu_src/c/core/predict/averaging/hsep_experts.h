@@ -7,8 +7,9 @@
 #ifndef HSEP_EXPERTS_H
 #define HSEP_EXPERTS_H
 
-#include "hsep_warm_start.h"
+#include "hsep_predict_constants.h"
 #include "hsep_solution.h"
+#include "hsep_warm_start.h"
 
 /* Size of the residuals so far. */
 typedef struct {
@@ -24,13 +25,8 @@ typedef struct {
 } hsep_expert_errors;
 
 typedef struct {
-    hsep_int Np, n;       /* samples of a window, and of a prediction, n >= Np */
-    hsep_int n_static, p; /* features without lags, lags */
-    hsep_int room;        /* rows that may wait in its solution */
-} hsep_expert_shape;
-
-typedef struct {
-    hsep_int Np, n, n_static, p;
+    hsep_int Np, n;           /* samples of a window, and of a prediction, n >= Np */
+    hsep_int n_static, p;     /* features without lags, lags */
     hsep_real variance;       /* m2, of the noise that the penalties come from */
     hsep_real rows_variance;  /* m2, mean square of the rows about the weights */
     hsep_real largest_square; /* m2, largest mean square of a window, and */
@@ -59,8 +55,15 @@ HSEP_API void hsep_residual_scale_follow(
 /* Effect that a feature may have, m: less than the residuals where most of them is an offset. */
 HSEP_API hsep_real hsep_residual_scale_effect(const hsep_residual_scale *self);
 
-HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *self, const hsep_expert_shape *shape);
-HSEP_API void hsep_expert_init(hsep_expert *self, const hsep_expert_shape *shape);
+/* Samples at the end of a window over which its solution may go on while rows come. */
+static inline hsep_int hsep_expert_ahead(hsep_int Np)
+{
+    return Np / 2 < HSEP_AVERAGING_AHEAD ? Np / 2 : HSEP_AVERAGING_AHEAD;
+}
+
+/* shape: its samples, features and lags; all else is 0, and is set by hsep_expert_lay_out. */
+HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *shape);
+HSEP_API void hsep_expert_init(hsep_expert *self, hsep_expert shape);
 
 static inline hsep_solution *hsep_expert_solution(hsep_expert *self) { return hsep_part(self, self->solution); }
 

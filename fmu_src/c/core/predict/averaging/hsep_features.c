@@ -57,12 +57,8 @@ HSEP_API hsep_real hsep_disturbances_resolved(const hsep_disturbances *self, hse
 
 HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_int n)
 {
-    hsep_real largest = 0.0, last = self->before.x_d;
-    for (hsep_int j = n; j-- > 0;) {
-        largest = hsep_fmax(largest, hsep_fabs(x_d[j] - last));
-        last = x_d[j];
-    }
-    return hsep_disturbances_resolved(self, largest) / self->T_s;
+    const hsep_real first = hsep_fabs(x_d[n - 1] - self->before.x_d);
+    return hsep_disturbances_resolved(self, hsep_fmax(first, hsep_largest_step(x_d, n))) / self->T_s;
 }
 
 /* Filter the disturbances first ... first + count - 1, whose n samples are side by side in u, and put the results and

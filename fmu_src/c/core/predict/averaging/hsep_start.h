@@ -79,13 +79,8 @@ static inline void start_respond(hsep_start *self, hsep_real step, hsep_real x_p
 static inline hsep_real start_step(const hsep_start *self, const hsep_real x_d[])
 {
     const hsep_int late = self->n - self->Np, first = self->n - 1 - late;
-    hsep_real peak = 0.0;
-    for (hsep_int j = first; j-- > 0;) {
-        const hsep_real change = hsep_fabs(x_d[j] - x_d[j + 1]);
-        peak = change > peak ? change : peak;
-    }
     const hsep_real step = first > 0 ? x_d[first - 1] - x_d[first] : 0.0;
-    return hsep_fabs(step) > HSEP_START_MOVING * peak ? step : 0.0;
+    return hsep_fabs(step) > HSEP_START_MOVING * hsep_largest_step(x_d, first + 1) ? step : 0.0;
 }
 
 /* Whether the commands of the first window, (n,), m, begin in motion. */
