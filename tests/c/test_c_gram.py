@@ -25,7 +25,7 @@ OFFSETS = ("penalties", "weights", "factor", "left", "least", "rows", "work", "a
 
 
 class CGram:
-    """hsep_gram."""
+    """hsep_gram, whose features are backwards."""
 
     def __init__(self, n: int) -> None:
         self.library, self.n = c_core.library(PREDICTOR), n
@@ -36,14 +36,14 @@ class CGram:
         self.library.hsep_gram_init(self._block, ctypes.c_uint64(n))
 
     def fold(self, rows: Array, target: Array) -> None:
-        for row in np.column_stack((rows, target)):
+        for row in np.column_stack((rows[:, ::-1], target)):
             place = self.library.hsep_gram_row(self._block)
             for j, value in enumerate(row.tolist()):
                 place[j] = value
             self.library.hsep_gram_fold(self._block)
 
     def fold_over(self, rows: Array, target: Array, repetitions: int) -> None:
-        stacked = np.ascontiguousarray(np.column_stack((rows, target)))
+        stacked = np.ascontiguousarray(np.column_stack((rows[:, ::-1], target)))
         count = ctypes.c_size_t(len(rows))
         self.library.test_fold_gram(self._block, pointer(stacked), count, ctypes.c_size_t(repetitions))
 
@@ -62,7 +62,7 @@ class CGram:
 
 
 class CSolution:
-    """Weights of the first features with penalties, as hsep_experts.c solves for them.
+    """Weights of the first features with penalties, as hsep_experts.c solves for them: the tail's are backwards.
 
     ``gram``: its rows, settled; ``penalties``, (m,): of its first ``m`` features; where these are all, the second
     half of them is the head, else there is none; ``other``, ``weight``: CGram and float: rows that are added with a
@@ -89,7 +89,7 @@ class CSolution:
         self._block = pointer(self.block)
         self.library.hsep_solution_init(self._block, *sizes)
         self.n_head, self.m = n_head, m
-        self._part("penalties", m)[:] = penalties
+        self._part("penalties", m)[:] = self._tail_backwards(penalties)
         if other is not None:
             other.settle()
         added = None if other is None else other._block
@@ -104,13 +104,13 @@ class CSolution:
 
     def add(self, rows: Array) -> None:
         """Take rows ``[φ | target]``."""
-        for row in np.ascontiguousarray(rows):
-            self.library.hsep_solution_row(self._block, pointer(row), ctypes.c_double(row[-1]))
+        for row in np.hstack((rows[:, -2::-1], rows[:, -1:])):
+            self.library.hsep_solution_row(self._block, pointer(row), ctypes.c_uint64(len(row) - 1))
 
     def finish(self, penalties: Array | None = None) -> None:
         """Solve for the weights, with other penalties of the tail if there are."""
         if penalties is not None:
-            self._part("penalties", len(penalties))[:] = penalties
+            self._part("penalties", len(penalties))[:] = self._tail_backwards(penalties)
         self.residual_sum = self.library.hsep_solution_finish(self._block)
 
     def left(self, to_come: int = 0) -> float:
@@ -120,12 +120,16 @@ class CSolution:
         place = int(self.block.view(np.uint64)[len(WORDS) + OFFSETS.index(name)])
         return self.block[place : place + count]
 
+    def _tail_backwards(self, features: Array) -> Array:
+        n_tail = self.m - self.n_head
+        return np.concatenate((features[:n_tail][::-1], features[n_tail:]))
+
     @property
     def weights(self) -> Array:
-        return self._part("weights", self.m)
+        return self._tail_backwards(self._part("weights", self.m))
 
     def leverage(self, rows: Array) -> Array:
-        found, in_order = [], np.hstack((rows[:, self.m - self.n_head :][:, ::-1], rows[:, : self.m - self.n_head]))
+        found, in_order = [], rows[:, ::-1]
         for first in range(0, len(rows), ABREAST):
             some = in_order[first : first + ABREAST]
             places = self._part("work", ABREAST * (self.m + 1)).reshape(ABREAST, self.m + 1)
@@ -287,7 +291,7 @@ def test_digits_do_not_wear_off() -> None:
     gram.settle()
     exact = [
         repetitions * sum((Fraction(a) * Fraction(b) for a, b in zip(x.tolist(), y.tolist(), strict=True)), Fraction(0))
-        for x, y in ((rows[:, 0], rows[:, 0]), (rows[:, 0], rows[:, 1]), (rows[:, 0], target))
+        for x, y in ((rows[:, 1], rows[:, 1]), (rows[:, 1], rows[:, 0]), (rows[:, 1], target))
     ]
     sums = gram.block[-12:-6]
     for found, expected in zip(sums[:3], exact, strict=True):

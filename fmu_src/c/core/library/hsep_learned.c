@@ -72,15 +72,25 @@ static int learned_take_factor(hsep_learned_bytes *from, hsep_predictor *predict
     hsep_regression *regression = gram == NULL ? hsep_paper_regression(hsep_predictor_paper(predictor)) : NULL;
     hsep_real n_rows = 0.0;
     int taken = learned_numbers(from, &n_rows, 1);
-    for (hsep_int i = 0; taken && i <= n; i++) {
-        taken = learned_numbers(from, gram != NULL ? hsep_gram_row(gram) : hsep_regression_row(regression), n + 1 - i);
-        if (gram != NULL) {
-            hsep_gram_load(gram, i);
-        } else {
-            hsep_regression_load(regression, i);
-        }
+    for (hsep_int i = 0; taken && i <= n && gram == NULL; i++) {
+        taken = learned_numbers(from, hsep_regression_row(regression), n + 1 - i);
+        hsep_regression_load(regression, i);
     }
-    *(gram != NULL ? &gram->n_rows : &regression->n_rows) = n_rows;
+    for (hsep_int i = 0; taken && i <= n && gram != NULL; i++) { /* a factor's rows stand for those it was made from */
+        hsep_real *row = hsep_gram_row(gram);
+        hsep_zero(row, n + 1);
+        for (hsep_int j = i; taken && j <= n; j++) {
+            const hsep_int place = hsep_gram_place(gram, hsep_averaged_lags(averaged, factor), j);
+            taken = learned_numbers(from, row + place, 1);
+        }
+        hsep_gram_fold(gram);
+    }
+    if (gram != NULL) {
+        hsep_gram_settle(gram);
+        gram->n_rows = n_rows;
+    } else {
+        regression->n_rows = n_rows;
+    }
     return taken;
 }
 
@@ -208,13 +218,15 @@ static hsep_real learned_factor(hsep_predictor *predictor, hsep_int factor, hsep
         hsep_regression_write(regression, triangle);
         return regression->n_rows;
     }
-    hsep_warm_start *evidence = hsep_averaged_evidence(hsep_predictor_averaged(predictor), factor);
+    hsep_averaged *averaged = hsep_predictor_averaged(predictor);
+    hsep_warm_start *evidence = hsep_averaged_evidence(averaged, factor);
+    const hsep_int n_lags = hsep_averaged_lags(averaged, factor);
     hsep_gram *of_run = hsep_warm_start_of_run(evidence), *earlier = hsep_warm_start_earlier(evidence);
     hsep_real *least = hsep_gram_row(of_run), *diagonal = triangle; /* work */
     memset(triangle, 0, (size_t)hsep_triangle(width) * sizeof(hsep_real));
-    hsep_gram_add_to(of_run, triangle);
+    hsep_gram_add_to(of_run, n_lags, triangle);
     if (earlier->n_rows > 0.0) {
-        hsep_gram_add_to(earlier, triangle);
+        hsep_gram_add_to(earlier, n_lags, triangle);
     }
     for (hsep_int i = 0; i < width; i++) { /* what rounding leaves of a pivot where rows are few or alike */
         least[i] = LEARNED_ROUNDING * *diagonal + HSEP_TINY(1e-40);

@@ -70,18 +70,6 @@ HSEP_API void hsep_gram_fold(hsep_gram *self)
     self->waiting++;
 }
 
-HSEP_API void hsep_gram_load(hsep_gram *self, hsep_int i)
-{
-    const hsep_int n = self->n;
-    hsep_real *row = hsep_gram_row(self);
-    hsep_copy(row + i, row, n + 1 - i);
-    hsep_zero(row, i);
-    hsep_gram_fold(self);
-    if (i == n) {
-        hsep_gram_settle(self);
-    }
-}
-
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight)
 {
     const hsep_int count = (hsep_int)hsep_triangle(self->n + 1);
@@ -102,15 +90,19 @@ HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight)
     }
 }
 
-HSEP_API void hsep_gram_add_to(const hsep_gram *self, hsep_real triangle[])
+HSEP_API void hsep_gram_add_to(const hsep_gram *self, hsep_int n_head, hsep_real triangle[])
 {
-    const hsep_int width = self->n + 1, count = (hsep_int)hsep_triangle(width);
-    hsep_axpy(triangle, 1.0, hsep_at_const(self, self->sums), count);
-    hsep_axpy(triangle, 1.0, hsep_at_const(self, self->carries), count);
-    for (hsep_int i = 0; i < width; triangle += width - i, i++) {
-        const hsep_real *row = hsep_at_const(self, self->rows) + i;
-        for (hsep_int b = 0; b < self->waiting; b++, row += width) {
-            hsep_axpy(triangle, *row, row, width - i);
+    const hsep_int width = self->n + 1;
+    const hsep_real *sums = hsep_at_const(self, self->sums), *carries = hsep_at_const(self, self->carries);
+    for (hsep_int i = 0; i < width; i++) {
+        for (hsep_int j = i; j < width; j++, triangle++) {
+            const hsep_int a = hsep_gram_place(self, n_head, i), b = hsep_gram_place(self, n_head, j);
+            const hsep_int first = a < b ? a : b, place = first * width - first * (first + 1) / 2 + (a < b ? b : a);
+            const hsep_real *row = hsep_at_const(self, self->rows);
+            *triangle = (*triangle + sums[place]) + carries[place];
+            for (hsep_int waiting = 0; waiting < self->waiting; waiting++, row += width) {
+                *triangle += row[a] * row[b];
+            }
         }
     }
 }

@@ -32,10 +32,6 @@ HSEP_API hsep_real *hsep_gram_row(hsep_gram *self);
 /* Take in that row, all entries finite. Cost: n^2 / 2 times 4 multiply-adds and 6 additions at every fourth row. */
 HSEP_API void hsep_gram_fold(hsep_gram *self);
 
-/* Take in row i of a factor [R z; 0 rho], its entries i ... n, which the caller has put into hsep_gram_row: all n + 1
- * rows of a factor stand for the rows that it was made from, whose number the caller sets. Cost: as hsep_gram_fold. */
-HSEP_API void hsep_gram_load(hsep_gram *self, hsep_int i);
-
 /* Add the rows of other, of the same features, each weighed by weight; weigh all rows so far by a weight. */
 HSEP_API void hsep_gram_add(hsep_gram *self, hsep_gram *other, hsep_real weight);
 HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight);
@@ -43,8 +39,15 @@ HSEP_API void hsep_gram_discount(hsep_gram *self, hsep_real weight);
 /* Add the rows that wait to the sums now, before they are read or saved. */
 HSEP_API void hsep_gram_settle(hsep_gram *self);
 
-/* Add all rows to a triangle of n + 1 rows, and change nothing. */
-HSEP_API void hsep_gram_add_to(const hsep_gram *self, hsep_real triangle[]);
+/* Place of feature i, or of the target, i = n, where the last n_head features come backwards before all others. */
+static inline hsep_int hsep_gram_place(const hsep_gram *self, hsep_int n_head, hsep_int i)
+{
+    const hsep_int n = self->n;
+    return i < n - n_head ? n_head + i : i < n ? n - 1 - i : n;
+}
+
+/* Add all rows of such features to a triangle of n + 1 rows in their order, and change nothing. */
+HSEP_API void hsep_gram_add_to(const hsep_gram *self, hsep_int n_head, hsep_real triangle[]);
 
 /* Sum of the squares of the targets, m2. */
 HSEP_API hsep_real hsep_gram_square(const hsep_gram *self);

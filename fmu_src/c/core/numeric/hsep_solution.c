@@ -38,35 +38,13 @@ static hsep_real *solution_tail(hsep_solution *self)
     return hsep_at(self, self->factor) + (hsep_int)before;
 }
 
-/* Add the rows of a Gram matrix that do not wait to the factor's triangle, in its order. */
+/* Add the rows of a Gram matrix that do not wait to the factor's triangle. */
 static void solution_add(hsep_solution *self, const hsep_gram *gram, hsep_real weight)
 {
-    const hsep_int n_head = self->n_head, n_tail = self->n_tail, n = gram->n;
-    const hsep_real *row = hsep_at_const(gram, gram->sums); /* row i of the triangle, from its diagonal on */
-    hsep_real *factor = hsep_at(self, self->factor), *tail = solution_tail(self);
-    for (hsep_int i = 0; i < n_tail; i++, row += n + 1 - (i - 1)) {
-        hsep_real *to = factor + n_head + i;
-        for (hsep_int j = 0; j < n_head; j++) {
-            *to += weight * row[n_tail + (n_head - 1 - j) - i];
-            to += n_head + n_tail - j;
-        }
-        hsep_axpy(tail, weight, row, n_tail - i);
-        tail[n_tail - i] += weight * row[n - i];
-        tail += n_tail + 1 - i;
-    }
-    for (hsep_int i = 0; i < n_head; i++) { /* a row of the Gram matrix is a column of the factor, upwards */
-        hsep_real *to = factor + (n_head - 1 - i);
-        for (hsep_int j = 0; j < n_head - i; j++) {
-            *to += weight * row[n_head - i - 1 - j];
-            to += n_head + n_tail - j;
-        }
-        /* one step below the diagonal of the next column, stored as the row's last entry, its target */
-        *to += weight * row[n - n_tail - i];
-        row += n - n_tail + 1 - i;
-    }
-    const hsep_real square = hsep_at_const(gram, gram->sums)[(hsep_int)hsep_triangle(n + 1) - 1];
-    *tail += weight * square;
-    self->square += weight * square;
+    const hsep_int count = (hsep_int)hsep_triangle(self->n_head + self->n_tail + 1);
+    const hsep_real *end = hsep_at_const(gram, gram->sums) + (hsep_int)hsep_triangle(gram->n + 1);
+    hsep_axpy(hsep_at(self, self->factor), weight, end - count, count);
+    self->square += weight * end[-1];
 }
 
 HSEP_API void hsep_solution_reset(hsep_solution *self)
@@ -94,24 +72,18 @@ HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, co
         least[i] = penalty > HSEP_SOLUTION_LEAST ? penalty : HSEP_SOLUTION_LEAST;
     }
     for (hsep_int b = 0; b < gram->waiting; b++) {
-        const hsep_real *row = hsep_at_const(gram, gram->rows) + b * (gram->n + 1);
-        hsep_solution_row(self, row, row[gram->n]);
+        hsep_solution_row(self, hsep_at_const(gram, gram->rows) + b * (gram->n + 1), gram->n);
     }
 }
 
-HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_real target)
+HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_int n)
 {
-    const hsep_int n_head = self->n_head, n_tail = self->n_tail, n = n_head + n_tail;
-    hsep_real *to = hsep_at(self, self->rows) + self->waiting * (n + 1);
+    const hsep_int width = self->n_head + self->n_tail + 1;
     if (self->waiting == self->room) { /* of a state that was changed on purpose */
         return;
     }
-    for (hsep_int i = 0; i < n_head; i++) {
-        to[i] = row[n_tail + n_head - 1 - i];
-    }
-    hsep_copy(to + n_head, row, n_tail);
-    to[n] = target;
-    self->square += target * target;
+    hsep_copy(hsep_at(self, self->rows) + self->waiting * width, row + (n + 1 - width), width);
+    self->square += row[n] * row[n];
     self->waiting++;
 }
 

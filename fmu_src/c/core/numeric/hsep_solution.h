@@ -9,8 +9,8 @@
  * the rest. What is left for hsep_solution_finish are the tail and the last rows. The solution is the same to rounding
  * as with all rows at once.
  *
- * Rows of a Gram matrix have the tail first. The head is factored from its last feature to its first: where these are
- * lags, penalties grow with them, and the largest pivots come first, as pivoting would have it. A block as
+ * The head is factored from its last feature to its first, as rows of a Gram matrix have it, before the tail: where
+ * these are lags, penalties grow with them, and the largest pivots come first, as pivoting would have it. A block as
  * hsep_layout.h has them.
  */
 #ifndef HSEP_SOLUTION_H
@@ -60,12 +60,12 @@ HSEP_API void hsep_solution_init(hsep_solution *self, hsep_int n_head, hsep_int 
 HSEP_API void hsep_solution_reset(hsep_solution *self);
 
 /* Begin with the rows of a Gram matrix so far, and those of other, weighed by weight, which is settled, or NULL. Its
- * first n_tail + n_head features count. Penalties of the head, >= 0, are in the block, behind those of the tail. Rows
+ * last n_head + n_tail features count. Penalties of the head, >= 0, are in the block, behind those of the tail. Rows
  * that wait in the Gram matrix wait here, too. */
 HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, const hsep_gram *other, hsep_real weight);
 
-/* Take another row of features, as the Gram matrix has them, and its target; the rows behind room are not taken. */
-HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_real target);
+/* Take another row of n features and its target, as the Gram matrix has them; the rows behind room are not taken. */
+HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_int n);
 
 /* Multiply-adds at most until the head is factored and has taken in the rows that wait, and so many to come. */
 HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come);

@@ -72,22 +72,23 @@ static void averaged_take_rows(hsep_averaged *self, const hsep_real x_pb[], cons
     self->known = last;
 }
 
-/* Learn the row [features without lags | lags | residual] of sample k. rows: (Np, n_static); e: (Np + lags,), m. */
+/* Learn the row [lags backwards | static features | residual] of sample k. rows: (Np, n_static); e: (Np + lags,), m. */
 static void averaged_fold(hsep_averaged *self, hsep_int kind, hsep_int k, const hsep_real rows[], const hsep_real e[])
 {
     hsep_gram *gram = hsep_warm_start_of_run(hsep_averaged_evidence(self, kind));
-    const hsep_int p = kind == HSEP_COMMAND_RESIDUAL ? HSEP_AVERAGING_LAGS_OF_COMMAND : self->p;
-    const hsep_int n_static = gram->n - p;
+    const hsep_int p = hsep_averaged_lags(self, kind), n_static = gram->n - p;
     const hsep_real *lags = e + (self->Np - k);
     hsep_real *to = hsep_gram_row(gram);
-    hsep_copy(to, rows + k * n_static, n_static);
-    hsep_copy(to + n_static, lags, p);
+    for (hsep_int i = 0; i < p; i++) {
+        to[p - 1 - i] = lags[i];
+    }
+    hsep_copy(to + p, rows + k * n_static, n_static);
     to[gram->n] = lags[-1];
     /* Behind early samples the next solutions may have begun. */
     for (hsep_int i = HSEP_REGRESSIONS; k >= self->early && i < HSEP_REGRESSIONS_END; i++) {
         hsep_solution *solution = hsep_averaged_solution(self, i);
         if (hsep_averaged_kind_of(self, i) == kind && solution != NULL && solution->begun) {
-            hsep_solution_row(solution, to, lags[-1]);
+            hsep_solution_row(solution, to, gram->n);
         }
     }
     hsep_gram_fold(gram);

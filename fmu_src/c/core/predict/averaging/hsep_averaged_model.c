@@ -4,20 +4,18 @@
 /* Features of the rows of some evidence. */
 static hsep_int averaged_n_features(const hsep_averaged *self, hsep_int kind)
 {
-    return kind == HSEP_COMMAND_RESIDUAL ? HSEP_COMMAND_FEATURES + HSEP_AVERAGING_LAGS_OF_COMMAND
-                                         : self->n_static + self->p;
+    return (kind == HSEP_COMMAND_RESIDUAL ? HSEP_COMMAND_FEATURES : self->n_static) + hsep_averaged_lags(self, kind);
 }
 
 /* Shape of an expert: as hsep_expert_lay_out has it. */
 static hsep_expert averaged_shape(const hsep_averaged *self, hsep_int expert)
 {
-    const int of_command = hsep_averaged_kind_of(self, expert) == HSEP_COMMAND_RESIDUAL;
-    const hsep_int p = hsep_expert_of(expert).has_lags ? self->p : 0;
+    const hsep_int kind = hsep_averaged_kind_of(self, expert), p = hsep_averaged_lags(self, kind);
     return (hsep_expert){
         .Np = self->Np,
         .n = self->n,
-        .n_static = of_command ? HSEP_COMMAND_FEATURES : self->n_static,
-        .p = of_command ? HSEP_AVERAGING_LAGS_OF_COMMAND : p};
+        .n_static = averaged_n_features(self, kind) - p,
+        .p = hsep_expert_of(expert).has_lags ? p : 0};
 }
 
 /* Bytes of the block of an expert, whichever it is the counterpart of. */

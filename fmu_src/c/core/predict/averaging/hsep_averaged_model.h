@@ -119,6 +119,12 @@ static inline hsep_int hsep_averaged_kind_of(const hsep_averaged *self, hsep_int
     return hsep_expert_of(hsep_expert_of(expert).is_fresh ? self->leading : expert).target;
 }
 
+/* Lags among the features of the rows of some evidence, which has them backwards before the other features. */
+static inline hsep_int hsep_averaged_lags(const hsep_averaged *self, hsep_int kind)
+{
+    return kind == HSEP_COMMAND_RESIDUAL ? HSEP_AVERAGING_LAGS_OF_COMMAND : self->p;
+}
+
 /* Whether this run doubts earlier ones. */
 static inline int hsep_averaged_doubts(hsep_averaged *self)
 {
