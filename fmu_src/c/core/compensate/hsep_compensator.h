@@ -9,8 +9,7 @@
  * sample that follows the last plan; without averaging more where fewer than 8 do (Np < 16, or spacing > 8), or all of
  * it at once. It is bounded by the parameters; 1000 splines in a plan are far from real time.
  *
- * A block as hsep_layout.h has them. Once the parameters are in range nothing here fails but the prediction of a
- * window, as in hsep_predictor.h.
+ * Once the parameters are in range nothing here fails but the prediction of a window, as in hsep_predictor.h.
  */
 #ifndef HSEP_COMPENSATOR_H
 #define HSEP_COMPENSATOR_H
@@ -36,9 +35,8 @@ struct hsep_compensator {
     hsep_int was_reset;        /* last level of the reset */
     hsep_real x_load;          /* m, load that a sample brings, */
     hsep_real first_load;      /* and that of the first sample, from which it counts, as positions do from the start */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int x_dm;      /* (Np,) m, the window: modified commands */
-    hsep_int loads;     /* (preview,) m, ring of the loads that came last, */
+    hsep_int x_dm;             /* (Np,) m, the window: modified commands */
+    hsep_int loads;            /* (preview,) m, ring of the loads that came last, */
     hsep_int load;      /* (horizon,) m, and those of the window and of what follows it: the drive moves as by so much
                            more command */
     hsep_int trial_x;   /* (horizon + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */

@@ -3,7 +3,7 @@
  *  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows of hsep_knots_widen.
  *
  * An iterate stays inside the bounds once a full step has reached them. What is found after fewer steps may exceed
- * them: the iterate that was farthest inside is kept beside it. A block as hsep_layout.h has them.
+ * them: the iterate that was farthest inside is kept beside it.
  */
 #ifndef HSEP_INTERIOR_H
 #define HSEP_INTERIOR_H

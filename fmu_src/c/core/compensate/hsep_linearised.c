@@ -159,7 +159,7 @@ static void linearised_of_increments(
             drive += weights[i] * (before[1] - before[0]);
         }
         hsep_real *e = run + (self->preview - 1 - u);
-        *e = hsep_recur(drive, lag_weights, e + 1, u < expert->p ? u : expert->p);
+        *e = hsep_recur(drive, lag_weights, e + 1, hsep_min(u, expert->p));
         to[u] = *e;
     }
 }
@@ -223,7 +223,7 @@ HSEP_API void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model,
         velocity[u] = (commands[1 + u] - commands[u]) / T_s;
         position[u] = change->passed[u];
     }
-    self->moves = change->n + 2 < self->preview ? change->n + 2 : self->preview;
+    self->moves = hsep_min(change->n + 2, self->preview);
     /* What is neither friction nor stiffness: the change behind G_pb, and as late as the experts of the command take
      * it, and their response to it */
     const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
@@ -296,7 +296,7 @@ static void linearised_add_stops(hsep_linearised *self, hsep_int i, hsep_int fir
 /* Disturbances in expert i by a change that begins at sample first, as column c of the columns abreast. */
 static void linearised_disturbance(hsep_linearised *self, hsep_int i, hsep_int first, hsep_int c)
 {
-    const hsep_int n = self->n, count = self->preview - first, moves = self->moves < count ? self->moves : count;
+    const hsep_int n = self->n, count = self->preview - first, moves = hsep_min(self->moves, count);
     const hsep_real *gains = hsep_at(self, self->gains) + i * LINEARISED_GAINS * n + (n - count);
     const hsep_real *x_2 = hsep_at(self, self->position), *x_1 = x_2 + 1, *x = x_1 + 1; /* the samples before, now */
     const hsep_real *v_1 = hsep_at(self, self->velocity) + 1, *v_d = v_1 + 1;
@@ -331,7 +331,7 @@ static void linearised_run(
 {
     const hsep_lanes *w = hsep_lanes_const(lags);
     for (hsep_int u = 0; u < count; u += LINEARISED_TOGETHER) {
-        const hsep_int before = u < p ? u : p;
+        const hsep_int before = hsep_min(u, p);
         for (int l = 0; l < HSEP_OF_FOUR; l++) { /* each sum has a name, and so a register */
             const hsep_lanes *from = hsep_lanes_const(drive + HSEP_PHYSICS_ABREAST * u) + l;
             hsep_lanes *now = hsep_lanes_at(e + HSEP_PHYSICS_ABREAST * u) + l;

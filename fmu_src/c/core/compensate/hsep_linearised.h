@@ -7,8 +7,7 @@
  *   dx_h = (1 - pi_A) G_pb + pi_L df_L + pi_S df_S + pi_A dx_A
  *
  * The expert of the command alone, A, is linear and time-invariant: its features are increments and lags of the
- * command. The expert D, which doubts earlier runs, counts as the expert whose counterpart it is. A block as
- * hsep_layout.h has them.
+ * command. The expert D, which doubts earlier runs, counts as the expert whose counterpart it is.
  */
 #ifndef HSEP_LINEARISED_H
 #define HSEP_LINEARISED_H
@@ -20,8 +19,8 @@ typedef struct {
     hsep_int preview; /* and its last ones, which a change may reach: all but what is late */
     hsep_int count;   /* disturbances */
     hsep_int moves;   /* samples in which v_d of a change, or of the sample before, is not 0 */
-    /* Offsets in words from the beginning of the struct; oldest first; of experts: of all that rows train, one after
-     * the other; abreast: HSEP_PHYSICS_ABREAST columns side by side, sample after sample */
+    /* Oldest first; of experts: of all that rows train, one after the other; abreast: HSEP_PHYSICS_ABREAST columns side
+     * by side, sample after sample */
     hsep_int slopes;      /* (n, count) slopes of the disturbances, sample after sample */
     hsep_int at_stop;     /* (n, HSEP_FEATURES_N_STOPS) hsep_int, last sample at which a stop operator was at its stop,
                            * counted from 1; 0: before all of them */

@@ -147,8 +147,7 @@ static void newton_open(hsep_newton *self, const hsep_newton_task *task)
 /* Splines, from one on, whose changes of x_h are computed side by side: they have the same distance of knots. */
 static hsep_int newton_together(const hsep_planner *planner, hsep_int first)
 {
-    const hsep_int left = hsep_knots_at(&planner->knots, first).last + 1 - first;
-    return left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
+    return hsep_min(hsep_knots_at(&planner->knots, first).last + 1 - first, HSEP_PHYSICS_ABREAST);
 }
 
 /* Weighted changes of x_h by the next splines; the first of a distance of knots begins the linearisation. */
@@ -182,20 +181,20 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
 static void newton_products(hsep_newton *self, hsep_planner *planner)
 {
     const hsep_int m = self->m, preview = self->preview, first = self->spline;
-    const hsep_int end = first + HSEP_NEWTON_PRODUCTS < m ? first + HSEP_NEWTON_PRODUCTS : m;
+    const hsep_int end = hsep_min(first + HSEP_NEWTON_PRODUCTS, m);
     const hsep_real *W = hsep_at(self, self->W), *target = hsep_at(self, self->target);
     const hsep_int *begins = newton_begins(self);
     hsep_real *v = hsep_planner_linear(planner);
     hsep_real *P = hsep_planner_quadratic(planner) + (first * m - first * (first - 1) / 2);
     for (hsep_int i = first; i < end; i++) {
         for (hsep_int j = i; j < m; j += 4) {
-            const hsep_int count = m - j < 4 ? m - j : 4;
+            const hsep_int count = hsep_min(m - j, 4);
             const hsep_real *rights[4];
             hsep_real sums[4];
             hsep_int from = preview; /* where one of both begins, or before that */
             for (hsep_int c = 0; c < 4; c++) {
                 const hsep_int column = c < count ? j + c : j;
-                from = begins[column] < from ? begins[column] : from;
+                from = hsep_min(from, begins[column]);
                 rights[c] = W + column * preview;
             }
             from = from > begins[i] ? from : begins[i];
@@ -341,8 +340,8 @@ static void newton_shift(hsep_newton *self, hsep_int kept)
  * little beside the variance of its prediction. */
 static void newton_take(hsep_newton *self, const hsep_planner *planner)
 {
-    const hsep_int near = HSEP_PLANNING_NEAR * (self->Np / hsep_planner_splines(planner)->spacing);
-    const hsep_int first = planner->n_pinned, end = near < self->n ? near : self->n;
+    const hsep_int window = self->Np / hsep_planner_splines(planner)->spacing, first = planner->n_pinned;
+    const hsep_int end = hsep_min(HSEP_PLANNING_NEAR * window, self->n);
     hsep_real *best = hsep_at(self, self->best) + HSEP_N_DECIDED, *corrected = hsep_at(self, self->corrected);
     const hsep_real *rest = hsep_at(self, self->rest) + HSEP_N_DECIDED;
     hsep_real product = 0.0, now = 0.0, before = 0.0;
@@ -467,9 +466,8 @@ static hsep_real newton_predict(
 {
     const hsep_int first = self->samples, all = self->late + self->preview, window = self->late + self->Np;
     const hsep_int apart = !varies ? 0 : first < window ? 1 : HSEP_NEWTON_APART; /* as hsep_averaged_go_on has it */
-    const hsep_int left = (apart == 1 ? window : all) - first;
     const hsep_int most = varies ? apart * HSEP_NEWTON_VARIED : first == 0 ? all / HSEP_NEWTON_AT_FIRST : all / 2;
-    const hsep_int count = left < most ? left : most;
+    const hsep_int count = hsep_min((apart == 1 ? window : all) - first, most);
     hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     if (c != NULL && first == 0) {
         newton_command(self, task, c, HSEP_N_DECIDED + self->n);

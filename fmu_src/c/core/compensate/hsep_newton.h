@@ -9,8 +9,7 @@
  * remainder then, and is followed where compensation is off.
  *
  * A plan is one function in reading order, cut by yields into short parts, each of which says what it costs;
- * hsep_newton_run does as many as a sample's equal share of the work that may be left. A block as
- * hsep_layout.h has them.
+ * hsep_newton_run does as many as a sample's equal share of the work that may be left.
  */
 #ifndef HSEP_NEWTON_H
 #define HSEP_NEWTON_H
@@ -54,21 +53,20 @@ typedef struct {
     hsep_real share;        /* of its change of the last plan that was taken last, but for what it doubts */
     hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
     hsep_real left;         /* and that this part and all after it nearly always take */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int rest;       /* (3 + n,) m, coefficients of the remainder of the last plan */
-    hsep_int best;       /* (3 + n,) m, coefficients of the best plan so far */
-    hsep_int of_physics; /* (3 + n,) m, coefficients of the physics model's plan */
-    hsep_int command;    /* (preview + late,) m, commands predicted last, relative to the start, newest first */
-    hsep_int x_pb;       /* (preview + late,) m, their prediction by the physics model, */
-    hsep_int e_h;        /* (preview + late + p,) m, and what the averaged model adds; behind it the last residuals */
-    hsep_int target;     /* (preview,) m, work */
-    hsep_int weight;     /* (preview,) of the errors of a plan: they count less at its end */
-    hsep_int corrected;  /* (n,) m, what the averaged model's last plan changed the one before by; 0 of any other */
-    hsep_int begins;     /* (m,) hsep_int, samples that the splines begin with, which are solved for */
-    hsep_int shapes;     /* (HSEP_NEWTON_SHAPES spacing,) splines of each distance of knots, one after the other, */
-    hsep_int passed;     /* (HSEP_KNOTS_LEVELS, preview) and these behind G_pb */
-    hsep_int gram;       /* triangle of m rows, W' W with G_pb alone */
-    hsep_int W;          /* (m, preview) weighted changes of x_h by splines, 0 before they begin */
+    hsep_int rest;          /* (3 + n,) m, coefficients of the remainder of the last plan */
+    hsep_int best;          /* (3 + n,) m, coefficients of the best plan so far */
+    hsep_int of_physics;    /* (3 + n,) m, coefficients of the physics model's plan */
+    hsep_int command;       /* (preview + late,) m, commands predicted last, relative to the start, newest first */
+    hsep_int x_pb;          /* (preview + late,) m, their prediction by the physics model, */
+    hsep_int e_h;       /* (preview + late + p,) m, and what the averaged model adds; behind it the last residuals */
+    hsep_int target;    /* (preview,) m, work */
+    hsep_int weight;    /* (preview,) of the errors of a plan: they count less at its end */
+    hsep_int corrected; /* (n,) m, what the averaged model's last plan changed the one before by; 0 of any other */
+    hsep_int begins;    /* (m,) hsep_int, samples that the splines begin with, which are solved for */
+    hsep_int shapes;    /* (HSEP_NEWTON_SHAPES spacing,) splines of each distance of knots, one after the other, */
+    hsep_int passed;    /* (HSEP_KNOTS_LEVELS, preview) and these behind G_pb */
+    hsep_int gram;      /* triangle of m rows, W' W with G_pb alone */
+    hsep_int W;         /* (m, preview) weighted changes of x_h by splines, 0 before they begin */
     hsep_int linearised;
     hsep_int physics; /* G_pb at the beginning of the window, */
     hsep_int trial;   /* and for a trial */

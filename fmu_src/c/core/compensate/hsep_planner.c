@@ -14,11 +14,10 @@ typedef struct {
     hsep_int shared;  /* splines that a stop has from its plan, those of a window and the next plan's pinned ones, */
     hsep_int n;       /* and those before all coefficients are alike */
     hsep_int count;   /* coefficients: the decided ones and those of all splines that begin in the preview */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int last;  /* (count,) m, the last stop, */
-    hsep_int own;   /* (count,) m, by which it differs from one that stops as these do, */
-    hsep_int now;   /* (count,) m, and the stop of the plan */
-    hsep_int gains; /* (2 (n - shared),) of the first two differences of coefficients, which make the next one */
+    hsep_int last;    /* (count,) m, the last stop, */
+    hsep_int own;     /* (count,) m, by which it differs from one that stops as these do, */
+    hsep_int now;     /* (count,) m, and the stop of the plan */
+    hsep_int gains;   /* (2 (n - shared),) of the first two differences of coefficients, which make the next one */
     /* (4 preview,) in shares */
     hsep_int low, high;            /* bounds of the rows of a change, */
     hsep_int start, way, own_rows; /* the last stop without its own part, the way to the plan's, and that part */
@@ -28,10 +27,9 @@ HSEP_ASSERT_WORDS(hsep_stop, 13);
 /* Splines that a bounded plan leaves as they are. */
 static hsep_int planner_n_pinned(const hsep_compensator_parameters *parameters)
 {
-    const hsep_int half = parameters->predictor.settings.Np / 2;
-    const hsep_int most =
-        parameters->predictor.averaging.averaging ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER;
-    return (half < most ? half : most) / parameters->settings.spacing;
+    const hsep_predictor_parameters *predictor = &parameters->predictor;
+    const hsep_int most = predictor->averaging.averaging ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER;
+    return hsep_min(predictor->settings.Np / 2, most) / parameters->settings.spacing;
 }
 
 HSEP_API hsep_knots hsep_planner_knots(const hsep_compensator_parameters *parameters)
@@ -583,7 +581,7 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     for (hsep_int i = 0; i < all && length < 1.0; i++) { /* behind what the next plan shares of it the change fades */
         const hsep_real gone = i > begin ? (hsep_real)(i - begin) / (hsep_real)(all - begin) : 0.0;
         const hsep_real left = 1.0 - gone * gone * gone;
-        plan[i] = left * left * left * last[i < self->count ? i : self->count - 1];
+        plan[i] = left * left * left * last[hsep_min(i, self->count - 1)];
     }
 }
 
@@ -607,7 +605,7 @@ HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
         const hsep_stop *stop = hsep_part_const(self, self->stop);
         hsep_real *last = hsep_at(self, self->stop + stop->last);
         for (hsep_int i = 0; i < stop->count; i++) {
-            last[i] = last[i + kept < stop->count ? i + kept : stop->count - 1];
+            last[i] = last[hsep_min(i + kept, stop->count - 1)];
         }
     }
 }

@@ -4,7 +4,7 @@
  *
  * Of a plan only the splines that begin in the first window are applied; hsep_planner_next advances by a window, and
  * the next plan starts from the remainder, which returns to x_d within the limits. A plan whose unconstrained minimum
- * is feasible is found at once; another one is solved in steps of equal cost. A block as hsep_layout.h has them.
+ * is feasible is found at once; another one is solved in steps of equal cost.
  */
 #ifndef HSEP_PLANNER_H
 #define HSEP_PLANNER_H
@@ -29,8 +29,7 @@ typedef struct {
     hsep_real jerk_weight;
     hsep_real change;                         /* share of the limit of |delta| that bounds it */
     hsep_real delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int c;      /* (3 + n,) m, coefficients */
+    hsep_int c;                               /* (3 + n,) m, coefficients */
     hsep_int total;  /* (4 preview,) rows of x_dm under the remainder of the last plan, in shares */
     hsep_int own;    /* (4 preview,) rows of x_d where one nearby exceeds its limit, else 0; order 0: 0 */
     hsep_int moves;  /* (preview,) which way x_d moves: -1, 0, 1; 0 where that does not matter */

@@ -65,7 +65,7 @@ static void splines_change(const hsep_splines *self, const hsep_real c[], hsep_i
     hsep_int k = first * spacing;
     hsep_zero(delta, k);
     for (hsep_int place = 0; k < self->preview; place++) { /* between two knots */
-        const hsep_int end = k + spacing < self->preview ? k + spacing : self->preview;
+        const hsep_int end = hsep_min(k + spacing, self->preview);
         hsep_int within = 0;
         if (place >= HSEP_N_DECIDED && place < count) {
             const hsep_real c0 = c[place], c1 = c[place - 1], c2 = c[place - 2], c3 = c[place - 3];

@@ -3,7 +3,7 @@
  * Spline j begins at sample j spacing and ends 4 spacings later; the last one ends so that the last four samples of a
  * plan are without change. Splines -3, -2, -1 began before the plan and still act in it. The drive limits the
  * differences of delta of orders 0 to 3. Each of them, as a share of its limit, is a "row": order o at sample k is row
- * o preview + k. A block as hsep_layout.h has them.
+ * o preview + k.
  */
 #ifndef HSEP_SPLINES_H
 #define HSEP_SPLINES_H
@@ -16,9 +16,8 @@
 
 typedef struct {
     hsep_int preview, spacing;
-    hsep_int n;                   /* splines that begin in a plan */
-    hsep_real share[HSEP_ORDERS]; /* 1 / limit of an order, 1/m */
-    /* Offsets in words from the beginning of the struct */
+    hsep_int n;                        /* splines that begin in a plan */
+    hsep_real share[HSEP_ORDERS];      /* 1 / limit of an order, 1/m */
     hsep_int shape;                    /* (4 spacing,) b */
     hsep_int differences[HSEP_ORDERS]; /* (4 spacing + 3,) of each order, in shares */
 } hsep_splines;

@@ -1,6 +1,6 @@
 /* Discrete-time physics-based model G_pb under a zero- or first-order hold, eqs. (2) and (15); as model/discrete.py.
  *
- * A block as hsep_layout.h has them. Nothing here can fail once the parameters are in range.
+ * Nothing here can fail once the parameters are in range.
  */
 #ifndef HSEP_PHYSICS_H
 #define HSEP_PHYSICS_H
@@ -21,9 +21,8 @@ typedef struct {
     hsep_int n_modes;
     hsep_int dead_time; /* whole samples by which the command is delayed */
     hsep_int oldest;    /* index of the next command to leave the dead time's ring */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int modes; /* hsep_discrete_mode[n_modes] */
-    hsep_int ring;  /* (dead_time,) m, commands within the dead time */
+    hsep_int modes;     /* hsep_discrete_mode[n_modes] */
+    hsep_int ring;      /* (dead_time,) m, commands within the dead time */
 } hsep_physics;
 
 HSEP_ASSERT_WORDS(hsep_mode, 4);

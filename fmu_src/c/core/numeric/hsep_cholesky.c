@@ -47,8 +47,7 @@ HSEP_API int hsep_cholesky_rows(
 {
     hsep_real *row = triangle + (hsep_int)(hsep_triangle(n) - hsep_triangle(n - first));
     for (hsep_int k = first; k < last; k += HSEP_CHOLESKY_PANEL) {
-        const hsep_int length = n - k, left = last - k;
-        const hsep_int count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
+        const hsep_int length = n - k, count = hsep_min(last - k, HSEP_CHOLESKY_PANEL);
         hsep_real *rows[HSEP_CHOLESKY_PANEL], a[HSEP_CHOLESKY_PANEL];
         const hsep_real *x[HSEP_CHOLESKY_PANEL]; /* what they have in the column of a row below, and behind it */
         for (hsep_int r = 0; r < count; r++) {
@@ -177,8 +176,8 @@ HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_int n, hsep
 {
     const hsep_real *row = triangle;
     for (hsep_int first = 0; first < count; first += HSEP_CHOLESKY_PANEL) {
-        const hsep_int left = count - first, height = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
-        const hsep_int upper = height < 4 ? height : 4, behind = n - first - height;
+        const hsep_int height = hsep_min(count - first, HSEP_CHOLESKY_PANEL), upper = hsep_min(height, 4);
+        const hsep_int behind = n - first - height;
         const hsep_real *rows[HSEP_CHOLESKY_PANEL], *x[HSEP_CHOLESKY_PANEL];
         hsep_real *y = b + first;
         for (hsep_int r = 0; r < height; r++) {

@@ -1,8 +1,7 @@
 /* Gram matrix of all rows [phi | target] of a regression, which hsep_solution.h solves.
  *
  * A row costs the same at every sample, a third of the work of updating a triangular factor. The rounding error of an
- * entry is kept and added back with the next rows (compensated summation), so that errors do not pile up. A block as
- * hsep_layout.h has them.
+ * entry is kept and added back with the next rows (compensated summation), so that errors do not pile up.
  */
 #ifndef HSEP_GRAM_H
 #define HSEP_GRAM_H
@@ -15,7 +14,6 @@ typedef struct {
     hsep_int n;       /* features */
     hsep_int waiting; /* rows that are not added yet */
     hsep_real n_rows; /* rows so far, weighted */
-    /* Offsets in words from the beginning of the struct */
     hsep_int rows;    /* (HSEP_GRAM_TOGETHER, n + 1) these, and the one that comes next */
     hsep_int sums;    /* triangle of n + 1 rows: sums of products of entries, from the diagonal to the right, */
     hsep_int carries; /* and what rounding took from them */

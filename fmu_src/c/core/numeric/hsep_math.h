@@ -30,6 +30,8 @@
 
 #define HSEP_PREDICTION_MAX HSEP_HUGE(1e100) /* m, of what is published: sums of squares of less cannot overflow */
 
+static inline hsep_int hsep_min(hsep_int a, hsep_int b) { return a < b ? a : b; }
+
 /* Whether all entries of a, (n,), are numbers within +- limit. */
 static inline int hsep_within(const hsep_real a[], hsep_int n, hsep_real limit)
 {

@@ -6,8 +6,7 @@
  * Givens rotations without square roots (Gentleman 1973): R = D^(1/2) U with a unit triangle U. Weights and data
  * never meet as normal equations, so nothing is squared but single numbers. Error bound: at most sqrt(2) times the
  * bound of ordinary Givens rotations, see hsep_regression.c. The rounding error of an entry is kept and added back with
- * the next row (compensated summation), so that errors do not pile up over 10^8 rows. A block as hsep_layout.h has
- * them.
+ * the next row (compensated summation), so that errors do not pile up over 10^8 rows.
  */
 #ifndef HSEP_REGRESSION_H
 #define HSEP_REGRESSION_H
@@ -15,9 +14,8 @@
 #include "hsep_layout.h"
 
 typedef struct {
-    hsep_int n;       /* features */
-    hsep_real n_rows; /* rows so far */
-    /* Offsets in words from the beginning of the struct */
+    hsep_int n;         /* features */
+    hsep_real n_rows;   /* rows so far */
     hsep_int inverse_d; /* (n,) 1/D */
     hsep_int row;       /* (n + 1,) the row that comes next */
     hsep_int factor;    /* (n (n + 1) / 2,) U and z, by rows, from behind the diagonal on */

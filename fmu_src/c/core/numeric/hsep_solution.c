@@ -109,7 +109,7 @@ HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, 
     while (all || amount > 0.0) {
         const hsep_int left = self->n_head - self->factored, waiting = self->waiting;
         if (waiting >= HSEP_SOLUTION_ABREAST || (all && left == 0 && waiting > 0)) {
-            const hsep_int count = waiting < HSEP_SOLUTION_ABREAST ? waiting : HSEP_SOLUTION_ABREAST;
+            const hsep_int count = hsep_min(waiting, HSEP_SOLUTION_ABREAST);
             amount -= (hsep_real)count * solution_of_row(self, self->factored);
             self->waiting -= count;
             hsep_copy(work, hsep_at(self, self->rows) + width * self->waiting, width * count);
@@ -120,7 +120,7 @@ HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, 
                 hsep_cholesky_take_one(factor, width, self->factored, work);
             }
         } else if (left > 0) {
-            const hsep_int count = left < HSEP_CHOLESKY_PANEL ? left : HSEP_CHOLESKY_PANEL;
+            const hsep_int count = hsep_min(left, HSEP_CHOLESKY_PANEL);
             const hsep_int last = self->factored + count;
             const hsep_real height = (hsep_real)(width - self->factored);
             /* no pivot is 0 */
@@ -188,7 +188,7 @@ static void solution_forward_abreast(hsep_solution *self)
     const hsep_real *row = hsep_at(self, self->factor);
     hsep_lanes *x = hsep_lanes_at(hsep_at(self, self->abreast));
     for (hsep_int first = 0; first < m; first += 4) {
-        const hsep_int left = m - first, height = left < 4 ? left : 4;
+        const hsep_int left = m - first, height = hsep_min(left, 4);
         const hsep_real *r[4] = {NULL};
         hsep_lanes *y = x + HSEP_OF_FOUR * first;
         for (hsep_int i = 0; i < height; i++) {
@@ -226,7 +226,7 @@ static void solution_leverages_abreast(hsep_solution *self, hsep_int count, hsep
     const hsep_lanes *x = hsep_lanes_at(to);
     hsep_lanes sums[HSEP_OF_FOUR];
     for (hsep_int c = 0; c < HSEP_SOLUTION_ABREAST; c++) { /* what is beyond is a copy */
-        const hsep_real *row = rows + (m + 1) * (c < count ? c : count - 1);
+        const hsep_real *row = rows + (m + 1) * hsep_min(c, count - 1);
         for (hsep_int i = 0; i < m; i++) {
             to[HSEP_SOLUTION_ABREAST * i + c] = row[i];
         }

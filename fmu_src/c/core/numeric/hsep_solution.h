@@ -10,8 +10,7 @@
  * as with all rows at once.
  *
  * The head is factored from its last feature to its first, as rows of a Gram matrix have it, before the tail: where
- * these are lags, penalties grow with them, and the largest pivots come first, as pivoting would have it. A block as
- * hsep_layout.h has them.
+ * these are lags, penalties grow with them, and the largest pivots come first, as pivoting would have it.
  */
 #ifndef HSEP_SOLUTION_H
 #define HSEP_SOLUTION_H
@@ -40,15 +39,14 @@ typedef struct {
     hsep_int waiting;        /* rows that have come since, and are not in the factor yet */
     hsep_int finished;       /* whether left is valid */
     hsep_real square;        /* sum of the squares of the targets */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int penalties; /* (n_tail + n_head,) */
-    hsep_int weights;   /* (n_tail + n_head,) */
-    hsep_int factor;    /* triangle [R z; 0 rho] of the head backwards, tail and target, by rows */
-    hsep_int left;      /* triangle of tail and target: what the head leaves of them, without penalties */
-    hsep_int least;     /* (n_head + n_tail + 1,) bounds on the pivots */
-    hsep_int rows;      /* (room, n_head + n_tail + 1) rows that wait, in that order */
-    hsep_int work;      /* (HSEP_SOLUTION_ABREAST, n_head + n_tail + 1) rows */
-    hsep_int abreast;   /* the same side by side, where there are vectors */
+    hsep_int penalties;      /* (n_tail + n_head,) */
+    hsep_int weights;        /* (n_tail + n_head,) */
+    hsep_int factor;         /* triangle [R z; 0 rho] of the head backwards, tail and target, by rows */
+    hsep_int left;           /* triangle of tail and target: what the head leaves of them, without penalties */
+    hsep_int least;          /* (n_head + n_tail + 1,) bounds on the pivots */
+    hsep_int rows;           /* (room, n_head + n_tail + 1) rows that wait, in that order */
+    hsep_int work;           /* (HSEP_SOLUTION_ABREAST, n_head + n_tail + 1) rows */
+    hsep_int abreast;        /* the same side by side, where there are vectors */
 } hsep_solution;
 HSEP_ASSERT_WORDS(hsep_solution, 16);
 

@@ -264,9 +264,8 @@ static hsep_int predictor_part(hsep_predictor *self)
 /* Predict the next samples of the window; with the first of them also the late samples, which are not measured yet. */
 static void predictor_go_on(hsep_predictor *self)
 {
-    const hsep_int late = self->late, published = self->n_published, left = self->Np - published;
-    const hsep_int part = predictor_part(self);
-    const hsep_int last = published + (left < part ? left : part);
+    const hsep_int late = self->late, published = self->n_published;
+    const hsep_int last = hsep_min(published + predictor_part(self), self->Np);
     const hsep_int first = published > 0 ? late + published : 0;
     hsep_predictor_predict(self, first, late + last);
     hsep_predictor_publish(self, last);

@@ -15,8 +15,8 @@
  * whose other parts the next samples do. At the end of a first window whose commands begin in motion all its rows are
  * folded and the solutions factored at once.
  *
- * A block as hsep_layout.h has them. Once the parameters are in range nothing here fails but the prediction of a
- * window: the learned recursion may diverge; then divergence is set and the outputs are invalid from there on.
+ * Once the parameters are in range nothing here fails but the prediction of a window: the learned recursion may
+ * diverge; then divergence is set and the outputs are invalid from there on.
  */
 #ifndef HSEP_PREDICTOR_H
 #define HSEP_PREDICTOR_H
@@ -46,17 +46,16 @@ struct hsep_predictor {
     hsep_int early;      /* whether measurements come a sample early */
     hsep_real next;      /* m, then the measurement of the next sample; NaN if it is missing */
     hsep_int divergence; /* hsep_divergence of the first window that diverged; latched */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int ahead;    /* (preview,) m, ring of the commands that came last */
-    hsep_int x_d;      /* (horizon,) m, commands of the window and what follows it; a compensator extends them */
-    hsep_int x_pb;     /* (Np,) m, the window: physics-based predictions, */
-    hsep_int x_h;      /* (Np,) m, hybrid predictions, */
-    hsep_int x_hold;   /* (Np,) m, and held added to x_pb; before all four the last samples not measured yet */
-    hsep_int ahead_pb; /* (Np,) m, response of the physics model to ahead, relative to start; alone */
-    hsep_int command;  /* (n,) m, commands of the window relative to start, newest first */
-    hsep_int past_x;   /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
-    hsep_int past_e;   /* (n + p,) m, e_pb likewise, as measured */
-    hsep_int e_h;      /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
+    hsep_int ahead;      /* (preview,) m, ring of the commands that came last */
+    hsep_int x_d;        /* (horizon,) m, commands of the window and what follows it; a compensator extends them */
+    hsep_int x_pb;       /* (Np,) m, the window: physics-based predictions, */
+    hsep_int x_h;        /* (Np,) m, hybrid predictions, */
+    hsep_int x_hold;     /* (Np,) m, and held added to x_pb; before all four the last samples not measured yet */
+    hsep_int ahead_pb;   /* (Np,) m, response of the physics model to ahead, relative to start; alone */
+    hsep_int command;    /* (n,) m, commands of the window relative to start, newest first */
+    hsep_int past_x;     /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
+    hsep_int past_e;     /* (n + p,) m, e_pb likewise, as measured */
+    hsep_int e_h;        /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
     hsep_int physics, uncertainty;
     hsep_int paper, averaged; /* the model of the residual e_pb = x - x_pb; the other one is 0 */
     hsep_int motion;          /* the motion before the run; with averaging, alone */

@@ -3,7 +3,7 @@
  *   phi(k) = [1 | x_pb(k) ... x_pb(k-q) | e_pb(k-1) ... e_pb(k-p)]
  *
  * Signals are kept newest first: sample k of n is at place n - 1 - k, its lag i at i places further. Every sample is a
- * row, folded when it is measured. A block as hsep_layout.h has them.
+ * row, folded when it is measured.
  */
 #ifndef HSEP_PAPER_H
 #define HSEP_PAPER_H
@@ -22,8 +22,7 @@ typedef struct {
 typedef struct {
     hsep_int p, q;     /* lags of e_pb and of x_pb */
     hsep_int features; /* 1 + (q + 1) + p: their number, and the place of the target in a row */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int weights; /* (features,) w */
+    hsep_int weights;  /* (features,) w */
     hsep_int regression;
 } hsep_paper;
 HSEP_ASSERT_WORDS(hsep_paper, 5);

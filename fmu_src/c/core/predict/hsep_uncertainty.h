@@ -1,8 +1,7 @@
 /* Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows;
  * as predict/uncertainty.py, which says how and why.
  *
- * Signals are kept newest first: sample k of the n that are predicted is at place n - 1 - k. The first Np of them are
- * learned. A block as hsep_layout.h has them. Cost of a window: 50 n operations each.
+ * Signals are kept newest first (hsep_window.h). Cost of a window: 50 n operations each.
  */
 #ifndef HSEP_UNCERTAINTY_H
 #define HSEP_UNCERTAINTY_H
@@ -22,8 +21,7 @@ typedef struct {
     hsep_int n;       /* samples that are predicted */
     hsep_real least;  /* m, what is published at least: the largest residual, if the last ones were rejected */
     hsep_real felt[HSEP_UNCERTAINTY_N_COMPONENTS]; /* m2, components averaged over time, up to the last sample */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int e_h;        /* (n,) m, residual of the window as published */
+    hsep_int e_h;                                  /* (n,) m, residual of the window as published */
     hsep_int components; /* (n, HSEP_UNCERTAINTY_N_COMPONENTS) m2 but for the first, which is 1 */
     hsep_int std;        /* (n,) m, standard deviation of the error */
 } hsep_uncertainty;

@@ -3,9 +3,9 @@
  *
  * A window is predicted by hsep_averaged_forecast, and learned by hsep_averaged_learn once it is measured. A
  * compensator, which decides the commands of a window, begins with the rest of its last plan, and calls
- * hsep_averaged_predict for other commands that it tries over its preview; the last ones count. Signals are kept newest
- * first: of n samples, sample k is at place n - 1 - k, and what was before them is behind them. Positions are relative
- * to the start. A block as hsep_layout.h has them; a window predicted and not measured yet is part of it.
+ * hsep_averaged_predict for other commands that it tries over its preview; the last ones count. A window
+ * predicted and not measured yet is part of the block. Positions are relative to the start, signals newest first
+ * (hsep_window.h).
  */
 #ifndef HSEP_AVERAGED_MODEL_H
 #define HSEP_AVERAGED_MODEL_H
@@ -64,10 +64,9 @@ typedef struct {
     hsep_real others[HSEP_N_EXPERTS];   /* its weights of the others where HSEP_RECALL does not count, */
     hsep_real shares[HSEP_N_EXPERTS];   /* and of all as they count */
     /* Of the window that is measured */
-    hsep_int followed;    /* samples that were judged and, as far as they are believed, learned */
-    hsep_int known;       /* samples up to the last one that is believed */
-    hsep_real n_accepted; /* samples that are */
-    /* Offsets in words from the beginning of the struct */
+    hsep_int followed;         /* samples that were judged and, as far as they are believed, learned */
+    hsep_int known;            /* samples up to the last one that is believed */
+    hsep_real n_accepted;      /* samples that are */
     hsep_int forecast_largest; /* (n_static,) largest magnitudes with the window that is predicted */
     hsep_int x;                /* (n,) m, position */
     hsep_int measured;         /* (Np,) m, measured position, relative to the start, NaN where missing */

@@ -119,8 +119,8 @@ static void expert_respond(hsep_expert *self, hsep_int first, hsep_int last)
 /* Variances of rows of samples k ... last - 1, of the first of every apart, at most HSEP_SOLUTION_ABREAST of them. */
 static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_int k, hsep_int last, hsep_int apart)
 {
-    const hsep_int n_static = self->n_static, p = self->p, left = (last - k + apart - 1) / apart;
-    const hsep_int count = left < HSEP_SOLUTION_ABREAST ? left : HSEP_SOLUTION_ABREAST;
+    const hsep_int n_static = self->n_static, p = self->p;
+    const hsep_int count = hsep_min((last - k + apart - 1) / apart, HSEP_SOLUTION_ABREAST);
     hsep_solution *solution = hsep_expert_solution(self);
     hsep_real *to = hsep_at(solution, solution->work), leverages[HSEP_SOLUTION_ABREAST];
     for (hsep_int c = 0; c < count; c++, to += p + n_static + 1) {

@@ -1,8 +1,7 @@
 /* Expert of the residual: a regression on static features and lags with normal priors, counted as far as its own
  * variance allows; as predict/averaging/experts.py, which says how.
  *
- * Signals are kept newest first: of the n samples that are predicted, sample k is at place n - 1 - k. The first Np of
- * them are the window, which is measured then. A block as hsep_layout.h has them.
+ * Signals as hsep_window.h has them: newest first.
  */
 #ifndef HSEP_EXPERTS_H
 #define HSEP_EXPERTS_H
@@ -31,16 +30,15 @@ typedef struct {
     hsep_real rows_variance;  /* m2, mean square of the rows about the weights */
     hsep_real largest_square; /* m2, largest mean square of a window, and */
     hsep_real bound;          /* m, bound on the prediction, as it was made */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int lag_scales; /* (p,) prior standard deviations of the weights of the lags */
-    hsep_int run;        /* (n + p,) m, the recursion, behind it measured residuals */
-    hsep_int unshrunk;   /* (n + p,) m, the same within bounds */
-    hsep_int e_h;        /* (n,) m, shrunk by its variance, and bounded */
-    hsep_int shrinkage;  /* (n,) what the variance leaves of it */
-    hsep_int response;   /* (n + p,) the recursion's impulse response, behind it 0 */
-    hsep_int squares;    /* (n,) its squares, oldest first */
-    hsep_int variances;  /* (n,) m2, of the rows */
-    hsep_int solution;   /* hsep_solution, whose head are the lags */
+    hsep_int lag_scales;      /* (p,) prior standard deviations of the weights of the lags */
+    hsep_int run;             /* (n + p,) m, the recursion, behind it measured residuals */
+    hsep_int unshrunk;        /* (n + p,) m, the same within bounds */
+    hsep_int e_h;             /* (n,) m, shrunk by its variance, and bounded */
+    hsep_int shrinkage;       /* (n,) what the variance leaves of it */
+    hsep_int response;        /* (n + p,) the recursion's impulse response, behind it 0 */
+    hsep_int squares;         /* (n,) its squares, oldest first */
+    hsep_int variances;       /* (n,) m2, of the rows */
+    hsep_int solution;        /* hsep_solution, whose head are the lags */
 } hsep_expert;
 
 HSEP_ASSERT_WORDS(hsep_residual_scale, 3);
@@ -56,10 +54,7 @@ HSEP_API void hsep_residual_scale_follow(
 HSEP_API hsep_real hsep_residual_scale_effect(const hsep_residual_scale *self);
 
 /* Samples at the end of a window over which its solution may go on while rows come. */
-static inline hsep_int hsep_expert_ahead(hsep_int Np)
-{
-    return Np / 2 < HSEP_AVERAGING_AHEAD ? Np / 2 : HSEP_AVERAGING_AHEAD;
-}
+static inline hsep_int hsep_expert_ahead(hsep_int Np) { return hsep_min(Np / 2, HSEP_AVERAGING_AHEAD); }
 
 /* shape: its samples, features and lags; all else is 0, and is set by hsep_expert_lay_out. */
 HSEP_API hsep_real hsep_expert_lay_out(hsep_expert *shape);

@@ -153,8 +153,7 @@ static void disturbances_of_command(
     hsep_real u[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
     hsep_zero(u, HSEP_PHYSICS_ABREAST * n); /* places without a disturbance are filtered, too */
     for (hsep_int first = 0; first < HSEP_DISTURBANCES_OF_COMMAND; first += HSEP_PHYSICS_ABREAST) {
-        const hsep_int left = HSEP_DISTURBANCES_OF_COMMAND - first;
-        const hsep_int count = left < HSEP_PHYSICS_ABREAST ? left : HSEP_PHYSICS_ABREAST;
+        const hsep_int count = hsep_min(HSEP_DISTURBANCES_OF_COMMAND - first, HSEP_PHYSICS_ABREAST);
         for (hsep_int i = 0; i < count; i++) {
             disturbances_one(self, first + i, steps, n, velocity_scale, u + i);
         }
@@ -173,7 +172,7 @@ HSEP_API void hsep_disturbances_command(
     now->x_d = self->before.x_d;
     memcpy(now->x_pb, self->before.x_pb, sizeof now->x_pb);
     for (hsep_int j = n; j > 0;) {
-        const hsep_int count = j < DISTURBANCES_TOGETHER ? j : DISTURBANCES_TOGETHER;
+        const hsep_int count = hsep_min(j, DISTURBANCES_TOGETHER);
         for (hsep_int k = 0; k < count; k++) {
             j--;
             steps[k] = x_d[j] - now->x_d;
@@ -212,14 +211,14 @@ HSEP_API void hsep_disturbances_motion(
 {
     const hsep_real s = hsep_sin(hsep_disturbances_angle(self, 0.0)), c = hsep_cos(hsep_disturbances_angle(self, 0.0));
     hsep_real disturbances[HSEP_PHYSICS_ABREAST * DISTURBANCES_TOGETHER];
-    const hsep_int most = last - first < DISTURBANCES_TOGETHER ? last - first : DISTURBANCES_TOGETHER;
+    const hsep_int most = hsep_min(last - first, DISTURBANCES_TOGETHER);
     hsep_zero(disturbances, HSEP_PHYSICS_ABREAST * most); /* as with friction */
     if (first == 0) {
         disturbances_rewind(self, HSEP_DISTURBANCES_STIFFNESS, self->count);
     }
     rows += first * self->n;
     for (hsep_int j = n - first; j > n - last;) {
-        const hsep_int left = j - (n - last), count = left < DISTURBANCES_TOGETHER ? left : DISTURBANCES_TOGETHER;
+        const hsep_int count = hsep_min(j - (n - last), DISTURBANCES_TOGETHER);
         for (hsep_int k = 0; k < count; k++) {
             hsep_real *of_sample = disturbances + HSEP_PHYSICS_ABREAST * k;
             j--;

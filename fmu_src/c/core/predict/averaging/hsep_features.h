@@ -3,8 +3,7 @@
  *
  * Static features are without lags. A row is [1 | x_pb and its differences | changes of the command over spans |
  * filtered disturbances | their first differences]. The expert without a physics model, eq. (4) with G_pb = 1, has
- * increments of the command. Positions are relative to the start. Of n samples, sample k is at place n - 1 - k: newest
- * first, as their past is behind them. Blocks as hsep_layout.h has them.
+ * increments of the command. Positions are relative to the start, signals newest first (hsep_window.h).
  */
 #ifndef HSEP_FEATURES_H
 #define HSEP_FEATURES_H
@@ -55,8 +54,8 @@ static inline hsep_int hsep_disturbances_count(const hsep_predictor_parameters *
 }
 static inline hsep_int hsep_disturbances_n(const hsep_predictor_parameters *parameters)
 {
-    const hsep_int q = parameters->settings.q, most = HSEP_FEATURES_DIFFERENCES;
-    return 2 + (q < most ? q : most) + HSEP_FEATURES_N_SPANS + 2 * hsep_disturbances_count(parameters);
+    const hsep_int n_differences = hsep_min(parameters->settings.q, HSEP_FEATURES_DIFFERENCES);
+    return 2 + n_differences + HSEP_FEATURES_N_SPANS + 2 * hsep_disturbances_count(parameters);
 }
 
 HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep_predictor_parameters *parameters);
@@ -114,10 +113,9 @@ typedef struct {
     hsep_int n;         /* samples of a prediction */
     hsep_int dead_time; /* samples before the command may act: at most half of the physics model's, rounded up */
     hsep_int n_before;  /* commands before a window that its features need */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int commands; /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
+    hsep_int commands;  /* (n + n_before,) m, of a prediction, newest first, and before it: its last m places if it has
                         * fewer samples */
-    hsep_int rows;     /* (n, HSEP_COMMAND_FEATURES), sample after sample */
+    hsep_int rows;      /* (n, HSEP_COMMAND_FEATURES), sample after sample */
 } hsep_command;
 HSEP_ASSERT_WORDS(hsep_command, 5);
 

@@ -1,8 +1,7 @@
 /* Memory of a run for recall: what the physics model missed the last time that the machine was told the same; as
  * predict/averaging/recall.py, which says how stretches are compared.
  *
- * Commands come one by one, and all lags are compared in the samples of a stride: even work. Rings, newest first. A
- * block as hsep_layout.h has them.
+ * Commands come one by one, and all lags are compared in the samples of a stride: even work. Rings, newest first.
  */
 #ifndef HSEP_RECALL_H
 #define HSEP_RECALL_H
@@ -24,11 +23,10 @@ typedef struct {
     hsep_int compared;   /* of the one that is compared, */
     hsep_int lag;        /* with the least distance, of those that were compared with it */
     hsep_int remembered; /* and of the last residual */
-    /* Offsets in words from the beginning of the struct */
-    hsep_int commands;  /* (stride,) m, the last ones, ring */
-    hsep_int changes;   /* (size + stride,) m, ring: older ones are overwritten while these are compared */
-    hsep_int residuals; /* (size,) m, ring */
-    hsep_int distances; /* (size,) m2, of the lags 1 ... size */
+    hsep_int commands;   /* (stride,) m, the last ones, ring */
+    hsep_int changes;    /* (size + stride,) m, ring: older ones are overwritten while these are compared */
+    hsep_int residuals;  /* (size,) m, ring */
+    hsep_int distances;  /* (size,) m2, of the lags 1 ... size */
 } hsep_recall;
 HSEP_ASSERT_WORDS(hsep_recall, 16);
 
@@ -76,12 +74,11 @@ static inline void recall_compare(hsep_recall *self, hsep_int first, hsep_int la
     hsep_real *distances = hsep_at(self, self->distances);
     hsep_int lag = self->lag;
     for (hsep_int begin = first; begin < last;) { /* up to the end of the ring, and from its beginning on */
-        const hsep_int place = (self->compared + begin) % length, left = length - place;
-        const hsep_int count = last - begin < left ? last - begin : left;
+        const hsep_int place = (self->compared + begin) % length, count = hsep_min(last - begin, length - place);
         recall_add(distances + (begin - 1), changes + place, count, now, self->fading);
         begin += count;
     }
-    const hsep_int begin = first > self->n ? first - 1 : self->n, end = (last < self->size ? last : self->size) - 1;
+    const hsep_int begin = first > self->n ? first - 1 : self->n, end = hsep_min(last, self->size) - 1;
     if (is_last && begin < end) { /* the shortest lag of equals */
         const hsep_int found = begin + hsep_place_of_least(distances + begin, end - begin);
         lag = distances[found] < distances[lag - 1] ? found + 1 : lag;

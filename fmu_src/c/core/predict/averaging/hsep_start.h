@@ -1,6 +1,6 @@
 /* Motion before a run, estimated from its first window; as predict/averaging/start.py, which says how.
  *
- * Positions are relative to the start, signals newest first. A block as hsep_layout.h has them.
+ * Positions are relative to the start, signals newest first.
  */
 #ifndef HSEP_START_H
 #define HSEP_START_H

@@ -1,5 +1,5 @@
 /* Rows that experts have learned: of this run and, as long as they are doubted, of earlier ones apart; as
- * predict/averaging/warm_start.py. A block as hsep_layout.h has them. */
+ * predict/averaging/warm_start.py. */
 #ifndef HSEP_WARM_START_H
 #define HSEP_WARM_START_H
 
