@@ -126,8 +126,7 @@ HSEP_API hsep_real hsep_predictor_std(const hsep_predictor *self, hsep_int i);
  */
 typedef struct hsep_compensator hsep_compensator;
 
-/* Model that plans the commands of a window, or tripped: none does, until a reset. As the setting compensate: the best
- * model allowed. */
+/* Model that plans the commands of a window; tripped: none, until a reset. As a setting: the best model allowed. */
 typedef enum { HSEP_SEP_OFF = 0, HSEP_SEP_PHYSICS = 1, HSEP_SEP_HYBRID = 2, HSEP_SEP_TRIPPED = 3 } hsep_sep_state;
 
 typedef struct {

@@ -46,8 +46,7 @@ HSEP_API hsep_instance *hsep_call_instantiate(
 /* The instance if the call is legal now; otherwise NULL, and why not is logged. */
 HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call);
 
-/* Body of a function of a version: it declares call and self, does an action, which returns a hsep_status, on self if
- * the call is legal, and returns. */
+/* Body of a version's function: it declares call and self, and does an action, a hsep_status, if the call is legal. */
 #define HSEP_DO(v, function, handle, action) \
     const hsep_call *call = HSEP_CALL(v, function); \
     hsep_instance *self = hsep_begin(handle, call); \
@@ -100,8 +99,7 @@ typedef struct {
     size_t n_values;
 } hsep_access;
 
-/* Check that all references are to variables of that type, and that there is a place for each of their values: if one
- * is refused, none is touched. */
+/* Check that all references are of that type, with a place for each value: if one is refused, none is touched. */
 HSEP_API hsep_status hsep_values_check(const hsep_instance *instance, const hsep_access *access);
 
 /* Check that n variables may be read, or set, of a type, as the call's name says: fmi2GetReal. Inputs may be set at any

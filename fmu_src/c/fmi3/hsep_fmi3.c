@@ -235,18 +235,9 @@ FMI3_NO_VARIABLE(UInt16)
 FMI3_NO_VARIABLE(UInt32)
 FMI3_NO_VARIABLE(String)
 
-fmi3Status fmi3GetBinary(
-    fmi3Instance instance, const fmi3ValueReference references[], size_t n, size_t sizes[], fmi3Binary values[],
-    size_t n_values)
-{
-    (void)sizes;
-    HSEP_DO(fmi3, GetBinary, instance, hsep_call_access(self, call, references, n, values, n_values));
-}
-
-fmi3Status fmi3SetBinary(
-    fmi3Instance instance, const fmi3ValueReference references[], size_t n, const size_t sizes[],
-    const fmi3Binary values[], size_t n_values)
-{
-    (void)sizes;
-    HSEP_DO(fmi3, SetBinary, instance, hsep_call_access(self, call, references, n, values, n_values));
-}
+HSEP_FUNCTION(
+    fmi3, GetBinary, ((void)sizes, hsep_call_access(self, call, references, n, values, n_values)), fmi3Instance c,
+    const fmi3ValueReference references[], size_t n, size_t sizes[], fmi3Binary values[], size_t n_values)
+HSEP_FUNCTION(
+    fmi3, SetBinary, ((void)sizes, hsep_call_access(self, call, references, n, values, n_values)), fmi3Instance c,
+    const fmi3ValueReference references[], size_t n, const size_t sizes[], const fmi3Binary values[], size_t n_values)

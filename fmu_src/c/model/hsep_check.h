@@ -31,8 +31,7 @@ HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, double 
 /* Check every parameter alone, the range being the table's; return how many are wrong, each added to message. */
 HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[]);
 
-/* Check that a position, m or rad, is finite and no further out than any machine is. where: format of at, the end of
- * the message. */
+/* Check that a position, m or rad, is finite and as near as machines are. where: format of at, the message's end. */
 HSEP_API hsep_status hsep_check_position(
     const hsep_context *context, const char *name, double value, const char *where, double at, char message[]);
 

@@ -251,8 +251,7 @@ static hsep_status online_count(
 
 /* Both models' ---------------------------------------------------------------------------------------------------- */
 
-/* Check all parameters, and read them: those of the library, whose modes stay in values, and the model's; size: of the
- * state, bytes. */
+/* Check all parameters, and read them: the library's, whose modes stay in values, and the model's; size: in bytes. */
 static hsep_status online_checked(
     const hsep_context *context, const double values[], hsep_parameters *parameters, online_parameters *derived,
     size_t *size, char message[])

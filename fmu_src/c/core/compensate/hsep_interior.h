@@ -48,8 +48,7 @@ typedef struct {
 
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines);
 
-/* Begin with x and the bounds as they are. knots: of the last splines; P: the triangle of m rows; cost: scale of the
- * cost, m2, > 0, for the tolerance. */
+/* Begin with x and the bounds as they are. knots: of the last splines; P: a triangle of m rows; cost: its scale, m2. */
 HSEP_API void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_knots *knots, const hsep_real P[], hsep_real cost,
     const hsep_tolerance *tolerance);

@@ -7,8 +7,7 @@
 #define LINEARISED_BEFORE 2      /* samples at rest before a change */
 #define LINEARISED_TOGETHER 4    /* samples of a recursion that are summed side by side */
 
-/* Weight in the stack of an expert that predicts a residual; 0 where it knows nothing, or predicts the other one. i: as
- * arrays of experts have it. */
+/* Weight in the stack of expert i of those that rows train; 0 if it knows nothing, or predicts another residual. */
 static hsep_real linearised_weight(const hsep_averaged *model, hsep_int i, hsep_int kind)
 {
     const hsep_int expert = HSEP_REGRESSIONS + i;

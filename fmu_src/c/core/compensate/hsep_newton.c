@@ -515,9 +515,8 @@ static hsep_real newton_left(hsep_newton *self, const hsep_newton_task *task, co
     return left;
 }
 
-/* Cut a plan: what follows costs so much, and is done when newton_go_on is called again; place: another one
- * for each. A switch into the midst of a function goes on there, as in protothreads (Dunkels et al. 2006): what is
- * needed behind a yield is in the block. */
+/* Cut a plan: what follows costs so much, and is done when newton_go_on is called again; where: another one for each. A
+ * switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006); the block has what it needs. */
 #define NEWTON_YIELD(where, cost) \
     do { \
         self->place = (where); \

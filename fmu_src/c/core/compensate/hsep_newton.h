@@ -96,8 +96,7 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
 
 /* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that is left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
- * Cost: of a plan as newton_left counts it; a second length of a Newton step, rarely tried, adds a prediction to the
- * last sample. */
+ * Cost of a plan: as newton_left has it; a second length of a Newton step, rarely tried, adds a prediction. */
 HSEP_API int hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples);
 
 #endif

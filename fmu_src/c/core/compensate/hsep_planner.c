@@ -503,8 +503,7 @@ static void stop_bounds(hsep_stop *self, const hsep_planner *planner, const hsep
     }
 }
 
-/* Share of the last stop's own part, nearest 0, with which all rows keep their bounds, so far on the way to the stop of
- * the plan; NaN: there is none. */
+/* Share of the last stop's own part, nearest 0, with which all rows keep their bounds, so far on the way; NaN: none. */
 static hsep_real stop_share(const hsep_stop *self, hsep_real length)
 {
     const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);

@@ -1,6 +1,6 @@
 #include "hsep_cholesky.h"
 
-/* Divide row k, (length,), by the root of its pivot; return whether there is one. least: bound on it, or NULL. Apart
+/* Divide a row, (length,), by the root of its pivot; return whether there is one. least: bound on it, or NULL. Apart
  * from the panel, whose registers are taken. */
 static int cholesky_pivot(hsep_real row[], hsep_int length, const hsep_real *least)
 {

@@ -1,5 +1,4 @@
-/* Functions of C's library for hsep_real, with HSEP_FLOAT32 the functions for float; and ranges of numbers. Reentrant;
- * allocate nothing. */
+/* Functions of C's library for hsep_real, with HSEP_FLOAT32 the functions for float; and ranges of numbers. */
 #ifndef HSEP_MATH_H
 #define HSEP_MATH_H
 

@@ -41,8 +41,7 @@ static inline hsep_real hsep_uncertainty_lay_out(hsep_uncertainty *self, hsep_in
     return end * sizeof(hsep_real);
 }
 
-/* Variance of the measurement noise, m2, that is assumed before the first window is measured. lambda: m2; noise_std:
- * given standard deviation, m, or 0. */
+/* Variance of the measurement noise before the first window is measured, m2. lambda: m2; noise_std: m, or 0. */
 static inline hsep_real hsep_uncertainty_first_variance(hsep_real lambda, hsep_real noise_std)
 {
     return noise_std > 0.0 ? hsep_fmax(lambda, noise_std * noise_std)
@@ -141,8 +140,7 @@ static inline void uncertainty_follow(hsep_uncertainty *self, const uncertainty_
     }
 }
 
-/* A step of expectation maximisation. seen, total: over the samples, the share of each component in the variance, with
- * and without the squared error. */
+/* A step of expectation maximisation. seen, total: sums of each component's share, with and without squared errors. */
 static inline void uncertainty_step_by(
     hsep_uncertainty *self, const hsep_real seen[HSEP_UNCERTAINTY_N_COMPONENTS],
     const hsep_real total[HSEP_UNCERTAINTY_N_COMPONENTS])

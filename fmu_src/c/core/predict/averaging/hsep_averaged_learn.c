@@ -20,8 +20,7 @@ HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real
     }
 }
 
-/* Begin to follow a window: take over its scales, where rows at lower velocities are forgotten if it outgrows them. The
- * rows so far fade if it is learned, fold. */
+/* Begin to follow a window: take over its scales; forget slower rows if it outgrows them. fold: rows so far fade. */
 static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], int fold)
 {
     hsep_disturbances *disturbances = hsep_averaged_disturbances(self);

@@ -86,8 +86,7 @@ HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_
     self->rows_variance = hsep_fmax(square, expert_resolved(solution->square)) / n_rows;
 }
 
-/* Free run of samples first ... last - 1 from the last residuals, e(k) := w_static' phi(k) + sum_i w_i e(k - i), and
- * the same within bounds; eq. (4). */
+/* Free run of samples first ... last - 1, e(k) := w_static' phi(k) + sum_i w_i e(k - i), and within bounds; eq. (4). */
 static void expert_free_run(hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last)
 {
     const hsep_int n_static = self->n_static;

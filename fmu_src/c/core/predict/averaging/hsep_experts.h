@@ -76,7 +76,7 @@ HSEP_API void hsep_expert_prepare(
     hsep_real least);
 
 /* Solve for the weights. n_rows: of all rows, weighted; scales: (n_static,) prior standard deviations of the weights
- * without lags. Cost: a hsep_solution_finish. */
+ * without lags. */
 HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_real scales[]);
 
 /* Begin a prediction. past: (p,) m, the last residuals; bound: m, on the prediction. */
@@ -89,9 +89,8 @@ HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_
 HSEP_API void hsep_expert_predict(
     hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int apart);
 
-/* Estimate noise and correlation from the errors of the first n samples of a window, which have been measured.
- * measured: (Np,) m; accepted: (Np,), 1 where it counts, which one of them does at least; given: m2, variance of the
- * noise, if it is known; else 0. */
+/* Estimate noise and correlation from the errors of the first n samples of a window. measured: (Np,) m; accepted:
+ * (Np,), 1 where it counts, which one of them does at least; given: m2, known variance of the noise, else 0. */
 HSEP_API void hsep_expert_judge(
     const hsep_expert *self, hsep_expert_errors *errors, const hsep_real measured[], const hsep_real accepted[],
     hsep_int n, hsep_real given);

@@ -61,8 +61,7 @@ HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self
     return hsep_disturbances_resolved(self, hsep_fmax(first, hsep_largest_step(x_d, n))) / self->T_s;
 }
 
-/* Filter the disturbances first ... first + count - 1, whose n samples are side by side in u, and put the results and
- * their first differences into the rows. */
+/* Filter count disturbances, whose n samples are side by side in u; the rows take the results and differences. */
 static void disturbances_filter_samples(
     hsep_disturbances *self, hsep_int first, hsep_int count, hsep_real u[], hsep_int n, hsep_real rows[])
 {

@@ -70,8 +70,7 @@ HSEP_API void hsep_disturbances_begin_in_motion(
 /* Motion from one sample to the next, m, that the numbers resolve; else 0: plans of an axis at rest are rounded. */
 HSEP_API hsep_real hsep_disturbances_resolved(const hsep_disturbances *self, hsep_real step);
 
-/* Largest magnitude of the commanded velocity over the n samples that come next, m/s, 0 below the numbers' resolution.
- * x_d: (n,), m, newest first. */
+/* Largest magnitude of the commanded velocity over the n samples that come next, m/s, 0 below numbers' resolution. */
 HSEP_API hsep_real hsep_disturbances_peak_velocity(const hsep_disturbances *self, const hsep_real x_d[], hsep_int n);
 
 /* Fill the rows of the n samples that come next, (n, self->n), sample after sample, but for what

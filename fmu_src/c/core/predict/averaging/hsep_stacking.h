@@ -1,6 +1,5 @@
 /* Stack of experts: the convex sum of their predictions that would have erred least so far; as
- * predict/averaging/stacking.py, which has the formula. The remainder of the weights is the prediction 0, the physics
- * model's. Plain data; reentrant. */
+ * predict/averaging/stacking.py, which has the formula. The remainder of the weights is the physics model's, 0. */
 #ifndef HSEP_STACKING_H
 #define HSEP_STACKING_H
 
@@ -130,8 +129,7 @@ static inline void stack_minimise(
     }
 }
 
-/* Add count samples. signals: each expert's predictions and, last, what was measured, (count,), m; counts: (count,), 1,
- * or 0 where it was not; work: (count,). */
+/* Add count samples. signals: predictions and, last, what was measured, (count,), m; counts: (count,), 0 where not. */
 static inline void hsep_stack_add(
     hsep_stack_products *self, const hsep_real *const signals[HSEP_N_EXPERTS + 1], const hsep_real counts[],
     hsep_real work[], hsep_int count)
@@ -150,8 +148,7 @@ static inline void hsep_stack_add(
 }
 
 /* Update the weights with a measured window, of one sample or more. least: least mean square that errors are judged by,
- * m2; like: (HSEP_N_EXPERTS,) weights of another stack, in place of the first weights and with more weight; or NULL.
- * Constant cost. */
+ * m2; like: (HSEP_N_EXPERTS,) weights of another stack, in place of the first weights and with more weight; or NULL. */
 static inline void hsep_stack_update(
     hsep_stack *self, const hsep_stack_products *products, hsep_real least, const hsep_real like[])
 {

@@ -110,8 +110,7 @@ static inline void start_fold(hsep_start *self, const hsep_real e[])
 }
 
 /* Whether the run began in motion: x_d: (n,), m, commands of its first window; e: (Np,), m, measured residuals of its
- * first samples relative to what was predicted, NaN where missing. Cost: n n_states (9 n_states / 2 + n_states)
- * multiply-adds, once. */
+ * first samples relative to what was predicted, NaN where missing. Cost: 6 n n_states^2 multiply-adds, once. */
 static inline int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], const hsep_real e[])
 {
     const hsep_int all = self->n_states + self->dead_time;
