@@ -110,23 +110,18 @@ fmi2Component fmi2Instantiate(
 
 HSEP_COMMON_FUNCTIONS(fmi2, Component, FMUstate, DeSerialize)
 
-fmi2Status fmi2SetupExperiment(
+HSEP_FUNCTION(
+    fmi2, SetupExperiment,
+    ((void)toleranceDefined, (void)tolerance, hsep_call_experiment(self, call, startTime, stopTimeDefined, stopTime)),
     fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime, fmi2Boolean stopTimeDefined,
     fmi2Real stopTime)
-{
-    (void)toleranceDefined, (void)tolerance;
-    HSEP_DO(fmi2, SetupExperiment, c, hsep_call_experiment(self, call, startTime, stopTimeDefined, stopTime));
-}
-
 HSEP_FUNCTION(fmi2, EnterInitializationMode, hsep_call_phase(self, HSEP_INITIALIZATION), fmi2Component c)
-
-fmi2Status fmi2DoStep(
+HSEP_FUNCTION(
+    fmi2, DoStep,
+    ((void)noSetFMUStatePriorToCurrentPoint,
+     hsep_call_step(self, call, currentCommunicationPoint, communicationStepSize)),
     fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
     fmi2Boolean noSetFMUStatePriorToCurrentPoint)
-{
-    (void)noSetFMUStatePriorToCurrentPoint;
-    HSEP_DO(fmi2, DoStep, c, hsep_call_step(self, call, currentCommunicationPoint, communicationStepSize));
-}
 
 /* Variables. A call is checked as a whole first: if one is refused, none is touched. */
 #define FMI2_ACCESS(type, get, set) \

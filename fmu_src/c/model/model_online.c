@@ -17,11 +17,9 @@
 #if defined(HSEP_MODEL_HYBRID_PREDICTOR)
 #define ONLINE(function) hsep_predictor_##function
 typedef hsep_predictor online_block;
-typedef hsep_predictor_parameters online_parameters;
 #else
 #define ONLINE(function) hsep_compensator_##function
 typedef hsep_compensator online_block;
-typedef hsep_compensator_parameters online_parameters;
 #endif
 
 /* The clock, and the inputs of the sample in progress. */
@@ -39,6 +37,9 @@ typedef struct {
 
 /* The arrays after the struct begin at a multiple of 16 bytes, as an importer's memory does. */
 HSEP_ASSERT(alignment_of_online_state, sizeof(online_state) % 16 == 0);
+
+/* Read a setting of the library. */
+#define READ(of, type, name, ...) parameters->of.name = (type)values[HSEP_VR_##name];
 
 /* Write the outputs that both models have. */
 static void online_write_predicted(const hsep_predictor_outputs *outputs, double values[])
@@ -162,11 +163,9 @@ static void online_sample(hsep_compensator *self, const online_inputs *inputs)
 }
 static hsep_predictor *online_predictor(hsep_compensator *self) { return hsep_compensator_predictor(self); }
 
-static hsep_compensator_parameters online_derive(const double values[], hsep_parameters *parameters)
+static hsep_predictor_parameters online_derive(const double values[], hsep_parameters *parameters)
 {
-#define READ(of, type, name, ...) parameters->of.name = (type)values[HSEP_VR_##name];
     HSEP_COMPENSATOR_SETTINGS(READ)
-#undef READ
     return hsep_compensator_derive(parameters);
 }
 
@@ -253,7 +252,7 @@ static hsep_status online_count(
 
 /* Check all parameters, and read them: the library's, whose modes stay in values, and the model's; size: in bytes. */
 static hsep_status online_checked(
-    const hsep_context *context, const double values[], hsep_parameters *parameters, online_parameters *derived,
+    const hsep_context *context, const double values[], hsep_parameters *parameters, hsep_predictor_parameters *derived,
     size_t *size, char message[])
 {
     const double Np = values[HSEP_VR_Np], p = values[HSEP_VR_p], q = values[HSEP_VR_q];
@@ -272,10 +271,8 @@ static hsep_status online_checked(
         return HSEP_REFUSED;
     }
     *parameters = (hsep_parameters){.n_modes = context->n_modes, .modes = hsep_table_modes(context, values)};
-#define READ(of, type, name, ...) parameters->of.name = (type)values[HSEP_VR_##name];
     HSEP_PREDICTOR_SETTINGS(READ)
     HSEP_AVERAGING_SETTINGS(READ)
-#undef READ
     *derived = online_derive(values, parameters);
     const double before = (double)(sizeof(online_state) - sizeof(online_block));
     return hsep_check_bytes(before + ONLINE(lay_out)(&(online_block){0}, derived), size, message);
@@ -284,7 +281,7 @@ static hsep_status online_checked(
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[])
 {
     hsep_parameters parameters;
-    online_parameters derived;
+    hsep_predictor_parameters derived;
     return online_checked(context, values, &parameters, &derived, size, message);
 }
 
@@ -357,7 +354,7 @@ HSEP_API hsep_status hsep_model_initialise(
     size_t needed = 0;
     online_state *self = state;
     hsep_parameters parameters;
-    online_parameters derived;
+    hsep_predictor_parameters derived;
     const double start = values[HSEP_VR_x_d_ahead];
     if (online_checked(context, values, &parameters, &derived, &needed, message) != HSEP_OK ||
         hsep_check_memory(needed, size, message) != HSEP_OK ||

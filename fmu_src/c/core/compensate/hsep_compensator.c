@@ -2,23 +2,22 @@
 
 static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};
 
-HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters)
+HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const hsep_real preview = (hsep_real)predictor->preview, horizon = (hsep_real)predictor->horizon;
+    const hsep_real preview = (hsep_real)parameters->preview, horizon = (hsep_real)parameters->horizon;
     hsep_real end = HSEP_WORDS(hsep_compensator);
     self->n_lost = parameters->n_lost;
-    self->x_dm = hsep_take(&end, (hsep_real)predictor->settings.Np);
+    self->x_dm = hsep_take(&end, (hsep_real)parameters->settings.Np);
     self->loads = hsep_take(&end, preview);
     self->load = hsep_take(&end, horizon);
-    self->trial_x = hsep_take(&end, horizon + (hsep_real)predictor->settings.q);
-    self->trial_e = hsep_take(&end, horizon + (hsep_real)predictor->settings.p);
+    self->trial_x = hsep_take(&end, horizon + (hsep_real)parameters->settings.q);
+    self->trial_e = hsep_take(&end, horizon + (hsep_real)parameters->settings.p);
     self->target = hsep_take(&end, horizon);
     self->spline_pb = hsep_take(&end, horizon);
-    self->trial = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, predictor));
+    self->trial = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, parameters));
     self->planner = hsep_take_block(&end, hsep_planner_lay_out(&(hsep_planner){0}, parameters));
-    self->predictor = hsep_take_block(&end, hsep_predictor_lay_out(&(hsep_predictor){0}, predictor));
-    if (predictor->averaging.averaging) {
+    self->predictor = hsep_take_block(&end, hsep_predictor_lay_out(&(hsep_predictor){0}, parameters));
+    if (parameters->averaging.averaging) {
         self->averaged = hsep_take_block(&end, hsep_newton_lay_out(&(hsep_newton){0}, parameters));
     }
     return end * sizeof(hsep_real);
@@ -33,22 +32,21 @@ static hsep_physics *compensator_trial(hsep_compensator *self)
 }
 
 HSEP_API void hsep_compensator_block_init(
-    hsep_compensator *self, const hsep_compensator_parameters *parameters, hsep_real start)
+    hsep_compensator *self, const hsep_predictor_parameters *parameters, hsep_real start)
 {
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
     memset(self, 0, (size_t)hsep_compensator_lay_out(self, parameters));
     (void)hsep_compensator_lay_out(self, parameters);
-    hsep_predictor_block_init(hsep_compensator_predictor(self), predictor, start);
+    hsep_predictor_block_init(hsep_compensator_predictor(self), parameters, start);
     hsep_planner_init(hsep_compensator_planner(self), parameters, start);
-    self->compensate = self->compensate_next = parameters->settings.compensate;
-    self->change_max_next = parameters->settings.change_max;
-    self->error_max = parameters->settings.following_error_max;
+    self->compensate = self->compensate_next = parameters->compensator.compensate;
+    self->change_max_next = parameters->compensator.change_max;
+    self->error_max = parameters->compensator.following_error_max;
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
     /* The spline filtered by the physics model from rest, which is constant. */
     hsep_physics *trial = compensator_trial(self);
     hsep_real *spline = hsep_at(self, self->spline_pb);
     const hsep_splines *splines = hsep_planner_splines(hsep_compensator_planner(self));
-    for (hsep_int k = 0; k < predictor->horizon; k++) {
+    for (hsep_int k = 0; k < parameters->horizon; k++) {
         spline[k] = hsep_physics_respond(trial, k < 4 * splines->spacing ? hsep_splines_shape(splines)[k] : 0.0);
     }
     if (self->averaged) {

@@ -49,11 +49,11 @@ struct hsep_compensator {
 };
 HSEP_ASSERT_WORDS(hsep_compensator, 23);
 
-HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_parameters *parameters);
-HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_compensator_parameters *parameters);
+HSEP_API hsep_predictor_parameters hsep_compensator_derive(const hsep_parameters *parameters);
+HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_predictor_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. hsep_compensator_begin has to follow. */
 HSEP_API void hsep_compensator_block_init(
-    hsep_compensator *self, const hsep_compensator_parameters *parameters, hsep_real start);
+    hsep_compensator *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
 /* Parts of the block: the predictor, for a warm start between hsep_compensator_block_init and hsep_compensator_begin;
  * the planner, and the one with averaging, if there is one. */

@@ -7,18 +7,17 @@ static const hsep_tolerance newton_tolerance = {HSEP_NEWTON_TOLERANCE};
 
 HSEP_ASSERT(lengths, sizeof newton_lengths == HSEP_NEWTON_TRIES * sizeof(hsep_real));
 
-HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_compensator_parameters *parameters)
+HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
     const hsep_knots knots = hsep_planner_knots(parameters);
-    const hsep_int spacing = parameters->settings.spacing, n = hsep_splines_count(predictor->horizon, spacing);
-    const hsep_real all = (hsep_real)hsep_predicted(predictor), preview = (hsep_real)predictor->horizon;
-    const hsep_real filter = hsep_physics_lay_out(&(hsep_physics){0}, predictor), m = (hsep_real)knots.m;
+    const hsep_int spacing = parameters->compensator.spacing, n = hsep_splines_count(parameters->horizon, spacing);
+    const hsep_real all = (hsep_real)hsep_predicted(parameters), preview = (hsep_real)parameters->horizon;
+    const hsep_real filter = hsep_physics_lay_out(&(hsep_physics){0}, parameters), m = (hsep_real)knots.m;
     const hsep_real coefficients = HSEP_N_DECIDED + (hsep_real)n;
     hsep_real end = HSEP_WORDS(hsep_newton);
-    self->preview = predictor->horizon;
-    self->late = hsep_late(&predictor->settings);
-    self->Np = predictor->settings.Np;
+    self->preview = parameters->horizon;
+    self->late = hsep_late(&parameters->settings);
+    self->Np = parameters->settings.Np;
     self->n = n;
     self->m = knots.m;
     const int few = (n - knots.n) * spacing < HSEP_NEWTON_TWICE;
@@ -28,7 +27,7 @@ HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_compensator
     self->of_physics = hsep_take(&end, coefficients);
     self->command = hsep_take(&end, all);
     self->x_pb = hsep_take(&end, all);
-    self->e_h = hsep_take(&end, all + (hsep_real)predictor->settings.p);
+    self->e_h = hsep_take(&end, all + (hsep_real)parameters->settings.p);
     self->target = hsep_take(&end, preview);
     self->weight = hsep_take(&end, preview);
     self->corrected = hsep_take(&end, (hsep_real)n);
@@ -37,7 +36,7 @@ HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_compensator
     self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
     self->gram = hsep_take(&end, hsep_triangle(knots.m));
     self->W = hsep_take(&end, m * preview);
-    self->linearised = hsep_take_block(&end, hsep_linearised_lay_out(&(hsep_linearised){0}, predictor));
+    self->linearised = hsep_take_block(&end, hsep_linearised_lay_out(&(hsep_linearised){0}, parameters));
     self->physics = hsep_take_block(&end, filter);
     self->trial = hsep_take_block(&end, filter);
     return end * sizeof(hsep_real);
@@ -240,14 +239,14 @@ static void newton_shape_all(hsep_newton *self, hsep_planner *plans, const hsep_
 }
 
 HSEP_API void hsep_newton_init(
-    hsep_newton *self, const hsep_compensator_parameters *parameters, hsep_planner *plans, const hsep_real spline[])
+    hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[])
 {
     (void)hsep_newton_lay_out(self, parameters);
-    const hsep_real window = (hsep_real)self->Np * parameters->predictor.settings.T_s; /* s */
+    const hsep_real window = (hsep_real)self->Np * parameters->settings.T_s; /* s */
     self->pause = (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / window + 0.5);
     self->share = 1.0;
     self->reach = HSEP_NEWTON_FIRST_REACH;
-    hsep_linearised_init(hsep_part(self, self->linearised), &parameters->predictor);
+    hsep_linearised_init(hsep_part(self, self->linearised), parameters);
     const hsep_int half = self->preview / 2, begin = self->Np > half ? self->Np : half, falling = self->preview - begin;
     hsep_real *weight = hsep_at(self, self->weight);
     for (hsep_int k = 0; k < self->preview; k++) {
@@ -516,7 +515,7 @@ static hsep_real newton_left(hsep_newton *self, const hsep_newton_task *task, co
 }
 
 /* Cut a plan: what follows costs so much, and is done when newton_go_on is called again; where: another one for each. A
- * switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006); the block has what it needs. */
+ * switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006), with what the block has. */
 #define NEWTON_YIELD(where, cost) \
     do { \
         self->place = (where); \

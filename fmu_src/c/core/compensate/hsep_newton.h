@@ -82,12 +82,12 @@ typedef struct {
     const hsep_real *load; /* (preview,) m, and what the drive's load adds to them */
 } hsep_newton_task;
 
-HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_compensator_parameters *parameters);
+HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_parameters *parameters);
 
 /* Fill the block, which is 0, with the planner that solves its plans and a spline filtered by the physics model,
  * (preview,), m/m. Cost: m^2 preview / 4 multiply-adds. */
 HSEP_API void hsep_newton_init(
-    hsep_newton *self, const hsep_compensator_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
+    hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan, but only samples that the plan leaves as they are,
  * and late ones. best: best model allowed, 0 none, 1 physics, 2 averaged, which judges plans once the warm-up is over.

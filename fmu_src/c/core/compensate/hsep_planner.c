@@ -25,27 +25,25 @@ typedef struct {
 HSEP_ASSERT_WORDS(hsep_stop, 13);
 
 /* Splines that a bounded plan leaves as they are. */
-static hsep_int planner_n_pinned(const hsep_compensator_parameters *parameters)
+static hsep_int planner_n_pinned(const hsep_predictor_parameters *parameters)
 {
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const hsep_int most = predictor->averaging.averaging ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER;
-    return hsep_min(predictor->settings.Np / 2, most) / parameters->settings.spacing;
+    const hsep_int most = parameters->averaging.averaging ? HSEP_PLANNING_PINNED_AVERAGED : HSEP_PLANNING_PINNED_PAPER;
+    return hsep_min(parameters->settings.Np / 2, most) / parameters->compensator.spacing;
 }
 
-HSEP_API hsep_knots hsep_planner_knots(const hsep_compensator_parameters *parameters)
+HSEP_API hsep_knots hsep_planner_knots(const hsep_predictor_parameters *parameters)
 {
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const hsep_int spacing = parameters->settings.spacing, n = hsep_splines_count(predictor->horizon, spacing);
-    const int wider = predictor->averaging.averaging && predictor->horizon == predictor->preview;
-    return hsep_knots_of(n - planner_n_pinned(parameters), wider ? predictor->settings.Np / spacing : 0);
+    const hsep_int spacing = parameters->compensator.spacing, n = hsep_splines_count(parameters->horizon, spacing);
+    const int wider = parameters->averaging.averaging && parameters->horizon == parameters->preview;
+    return hsep_knots_of(n - planner_n_pinned(parameters), wider ? parameters->settings.Np / spacing : 0);
 }
 
-static hsep_real stop_lay_out(hsep_stop *self, const hsep_compensator_parameters *parameters)
+static hsep_real stop_lay_out(hsep_stop *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_int preview = parameters->predictor.preview, spacing = parameters->settings.spacing;
+    const hsep_int preview = parameters->preview, spacing = parameters->compensator.spacing;
     hsep_real end = HSEP_WORDS(hsep_stop);
     self->preview = preview;
-    self->shared = parameters->predictor.settings.Np / spacing + planner_n_pinned(parameters);
+    self->shared = parameters->settings.Np / spacing + planner_n_pinned(parameters);
     self->n = (preview - HSEP_SPLINES_END) / spacing - 2;
     self->count = HSEP_N_DECIDED + (preview + spacing - 1) / spacing;
     self->last = hsep_take(&end, (hsep_real)self->count);
@@ -60,17 +58,16 @@ static hsep_real stop_lay_out(hsep_stop *self, const hsep_compensator_parameters
     return end * sizeof(hsep_real);
 }
 
-HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_compensator_parameters *parameters)
+HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_predictor_parameters *predictor = &parameters->predictor;
-    const hsep_int spacing = parameters->settings.spacing, n = hsep_splines_count(predictor->horizon, spacing);
-    const hsep_real preview = (hsep_real)predictor->horizon;
+    const hsep_int spacing = parameters->compensator.spacing, n = hsep_splines_count(parameters->horizon, spacing);
+    const hsep_real preview = (hsep_real)parameters->horizon;
     hsep_real end = HSEP_WORDS(hsep_planner);
-    self->Np = predictor->settings.Np;
+    self->Np = parameters->settings.Np;
     self->n_pinned = planner_n_pinned(parameters);
-    self->no_reversal = parameters->settings.no_reversal;
+    self->no_reversal = parameters->compensator.no_reversal;
     self->knots = hsep_planner_knots(parameters);
-    self->jerk_weight = parameters->settings.jerk_weight;
+    self->jerk_weight = parameters->compensator.jerk_weight;
     self->c = hsep_take(&end, HSEP_N_DECIDED + (hsep_real)n);
     self->total = hsep_take(&end, HSEP_ORDERS * preview);
     self->own = hsep_take(&end, HSEP_ORDERS * preview);
@@ -78,9 +75,9 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_compensat
     self->third = hsep_take(&end, preview);
     self->P = hsep_take(&end, hsep_triangle(n));
     self->factor = hsep_take(&end, hsep_triangle(n));
-    self->splines = hsep_take_block(&end, hsep_splines_lay_out(&(hsep_splines){0}, predictor->horizon, spacing));
-    self->interior = hsep_take_block(&end, hsep_interior_size(predictor->horizon, n));
-    if (predictor->preview < predictor->horizon) {
+    self->splines = hsep_take_block(&end, hsep_splines_lay_out(&(hsep_splines){0}, parameters->horizon, spacing));
+    self->interior = hsep_take_block(&end, hsep_interior_size(parameters->horizon, n));
+    if (parameters->preview < parameters->horizon) {
         self->stop = hsep_take_block(&end, stop_lay_out(&(hsep_stop){0}, parameters));
     }
     return end * sizeof(hsep_real);
@@ -112,10 +109,10 @@ static void stop_gains(hsep_stop *self, const hsep_splines *splines)
     }
 }
 
-HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_compensator_parameters *parameters, hsep_real start)
+HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_predictor_parameters *parameters, hsep_real start)
 {
-    const hsep_compensator_settings *settings = &parameters->settings;
-    const hsep_real T_s = parameters->predictor.settings.T_s;
+    const hsep_compensator_settings *settings = &parameters->compensator;
+    const hsep_real T_s = parameters->settings.T_s;
     const hsep_real limits[HSEP_ORDERS] = {
         settings->change_max, settings->v_max * T_s, settings->a_max * (T_s * T_s),
         settings->j_max * (T_s * T_s * T_s)};
@@ -124,7 +121,7 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_compensator_param
     for (int i = 0; i < 3; i++) {
         self->x_d_before[i] = start;
     }
-    hsep_splines_init(hsep_part(self, self->splines), parameters->predictor.horizon, settings->spacing, limits);
+    hsep_splines_init(hsep_part(self, self->splines), parameters->horizon, settings->spacing, limits);
     if (self->stop > 0) {
         const hsep_splines *splines = hsep_planner_splines(self);
         hsep_stop *stop = hsep_part(self, self->stop);
@@ -589,10 +586,8 @@ HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[])
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_real *c = hsep_at(self, self->c);
     for (hsep_int k = self->Np > 3 ? self->Np - 3 : 0; k < self->Np; k++) {
-        for (int i = 0; i < 2; i++) {
-            self->delta_before[i] = self->delta_before[i + 1];
-            self->x_d_before[i] = self->x_d_before[i + 1];
-        }
+        hsep_copy(self->delta_before, self->delta_before + 1, 2);
+        hsep_copy(self->x_d_before, self->x_d_before + 1, 2);
         self->delta_before[2] = hsep_planner_delta(self, k);
         self->x_d_before[2] = x_d[k];
     }

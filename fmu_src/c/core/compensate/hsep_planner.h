@@ -13,14 +13,6 @@
 #include "hsep_splines.h"
 #include "hsep_window.h"
 
-/* Parameters of a compensator and its planners. A plan is as long as the predictor's horizon, at least Np + 4 spacing +
- * 3; behind the preview x_d goes on as it may not. */
-typedef struct {
-    hsep_predictor_parameters predictor; /* planned */
-    hsep_compensator_settings settings;
-    hsep_int n_lost; /* samples without a measurement after which the change fades; 0: never */
-} hsep_compensator_parameters;
-
 typedef struct {
     hsep_int Np;
     hsep_int n_pinned; /* splines of a bounded plan that stay as they were */
@@ -73,11 +65,11 @@ typedef enum {
 } hsep_plan_status;
 
 /* Knots that a change of the last plan is solved for: of the splines that a bounded plan does not leave as they are. */
-HSEP_API hsep_knots hsep_planner_knots(const hsep_compensator_parameters *parameters);
+HSEP_API hsep_knots hsep_planner_knots(const hsep_predictor_parameters *parameters);
 
-HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_compensator_parameters *parameters);
+HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_predictor_parameters *parameters);
 /* Fill the block, which is 0, for a drive at rest at start, m. */
-HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_compensator_parameters *parameters, hsep_real start);
+HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_predictor_parameters *parameters, hsep_real start);
 
 /* Samples that a bounded plan leaves as they are: the time to solve it in. */
 static inline hsep_int hsep_planner_pinned(const hsep_planner *self)

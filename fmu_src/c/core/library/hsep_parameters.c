@@ -90,30 +90,28 @@ HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *
     return (hsep_predictor_parameters){
         .settings = *settings,
         .averaging = parameters->averaging,
+        .compensator = parameters->compensator,
         .preview = settings->Np,
         .horizon = settings->Np,
         /* The warm-up counts from the end of the first fill. */
         .n_init = (hsep_real)settings->Np + parameters_samples(parameters_t_init(parameters), settings->T_s),
-        .planned = 0,
         .n_modes = parameters->n_modes,
         .modes = parameters->modes};
 }
 
-HSEP_API hsep_compensator_parameters hsep_compensator_derive(const hsep_parameters *parameters)
+HSEP_API hsep_predictor_parameters hsep_compensator_derive(const hsep_parameters *parameters)
 {
     const hsep_compensator_settings *settings = &parameters->compensator;
     const hsep_int Np = parameters->predictor.Np, preview = settings->preview;
     const hsep_real T_s = parameters->predictor.T_s, t_init = parameters_t_init(parameters);
-    hsep_compensator_parameters derived = {
-        .predictor = hsep_predictor_derive(parameters),
-        .settings = *settings,
-        .n_lost = (hsep_int)parameters_samples(settings->measurement_timeout, T_s)};
+    hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
     /* Behind the window, and what the next one leaves as it is, a stop has to fit into the preview. */
     const int fits = preview >= Np + Np / 2 + 5 * settings->spacing + HSEP_SPLINES_END;
-    derived.predictor.preview = preview;
-    derived.predictor.horizon = fits && settings->horizon > preview ? settings->horizon : preview;
+    derived.preview = preview;
+    derived.horizon = fits && settings->horizon > preview ? settings->horizon : preview;
+    derived.n_lost = (hsep_int)parameters_samples(settings->measurement_timeout, T_s);
     /* The warm-up counts from the end of the first fill; without one, what is known plans the first window. */
-    derived.predictor.n_init = parameters_samples(t_init > 0.0 ? t_init + (hsep_real)preview * T_s : 0.0, T_s);
-    derived.predictor.planned = 1;
+    derived.n_init = parameters_samples(t_init > 0.0 ? t_init + (hsep_real)preview * T_s : 0.0, T_s);
+    derived.planned = 1;
     return derived;
 }

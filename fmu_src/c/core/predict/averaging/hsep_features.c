@@ -88,9 +88,7 @@ static void disturbances_rewind(hsep_disturbances *self, hsep_int first, hsep_in
     hsep_copy(
         disturbances_filter(self, self->count + first), disturbances_filter(self, first),
         (last - first) * self->filter_words);
-    for (hsep_int i = first; i < last; i++) {
-        self->after.filtered[i] = self->before.filtered[i];
-    }
+    hsep_copy(self->after.filtered + first, self->before.filtered + first, last - first);
 }
 
 /* Put 1, x_pb(k) and its differences, and changes of the command, into a row. x_pb: the last four; late: the command
@@ -176,9 +174,7 @@ HSEP_API void hsep_disturbances_command(
             j--;
             steps[k] = x_d[j] - now->x_d;
             now->x_d = x_d[j];
-            for (int i = HSEP_FEATURES_DIFFERENCES; i > 0; i--) {
-                now->x_pb[i] = now->x_pb[i - 1];
-            }
+            hsep_copy(now->x_pb + 1, now->x_pb, HSEP_FEATURES_DIFFERENCES);
             now->x_pb[0] = x_pb[j];
             disturbances_linear(self, now->x_pb, late + j, rows + k * self->n);
         }
