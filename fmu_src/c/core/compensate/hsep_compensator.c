@@ -143,7 +143,7 @@ static int compensator_has_stable_poles(const hsep_recursion *recursion, hsep_re
     return 1;
 }
 
-/* Samples of a window that follow the last plan while one is made: none, or two, whose differences spread needs. */
+/* Samples of a window that follow the last plan while one is made, not one alone: spread needs differences. */
 static hsep_int compensator_pinned(hsep_compensator *self)
 {
     const hsep_int pinned = hsep_planner_pinned(hsep_compensator_planner(self));

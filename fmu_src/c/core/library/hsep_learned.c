@@ -68,29 +68,28 @@ static int learned_take_factor(hsep_learned_bytes *from, hsep_predictor *predict
 {
     hsep_averaged *averaged = hsep_predictor_averaged(predictor);
     const hsep_int n = learned_n_features(predictor, factor);
-    hsep_gram *gram = averaged != NULL ? learned_gram(averaged, factor) : NULL;
-    hsep_regression *regression = gram == NULL ? hsep_paper_regression(hsep_predictor_paper(predictor)) : NULL;
     hsep_real n_rows = 0.0;
     int taken = learned_numbers(from, &n_rows, 1);
-    for (hsep_int i = 0; taken && i <= n && gram == NULL; i++) {
-        taken = learned_numbers(from, hsep_regression_row(regression), n + 1 - i);
-        hsep_regression_load(regression, i);
+    if (averaged == NULL) {
+        hsep_regression *regression = hsep_paper_regression(hsep_predictor_paper(predictor));
+        for (hsep_int i = 0; taken && i <= n; i++) {
+            taken = learned_numbers(from, hsep_regression_row(regression), n + 1 - i);
+            hsep_regression_load(regression, i);
+        }
+        regression->n_rows = n_rows;
+        return taken;
     }
-    for (hsep_int i = 0; taken && i <= n && gram != NULL; i++) { /* a factor's rows stand for those it was made from */
+    hsep_gram *gram = learned_gram(averaged, factor);
+    for (hsep_int i = 0; taken && i <= n; i++) { /* a factor's rows stand for those it was made from */
         hsep_real *row = hsep_gram_row(gram);
         hsep_zero(row, n + 1);
         for (hsep_int j = i; taken && j <= n; j++) {
-            const hsep_int place = hsep_gram_place(gram, hsep_averaged_lags(averaged, factor), j);
-            taken = learned_numbers(from, row + place, 1);
+            taken = learned_numbers(from, row + hsep_gram_place(gram, hsep_averaged_lags(averaged, factor), j), 1);
         }
         hsep_gram_fold(gram);
     }
-    if (gram != NULL) {
-        hsep_gram_settle(gram);
-        gram->n_rows = n_rows;
-    } else {
-        regression->n_rows = n_rows;
-    }
+    hsep_gram_settle(gram);
+    gram->n_rows = n_rows;
     return taken;
 }
 

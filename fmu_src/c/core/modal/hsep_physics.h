@@ -1,7 +1,5 @@
 /* Discrete-time physics-based model G_pb under a zero- or first-order hold, eqs. (2) and (15); as model/discrete.py.
- *
- * Nothing here can fail once the parameters are in range.
- */
+ * Nothing here can fail once the parameters are in range. */
 #ifndef HSEP_PHYSICS_H
 #define HSEP_PHYSICS_H
 

@@ -3,9 +3,8 @@
  *
  * A window is predicted by hsep_averaged_forecast, and learned by hsep_averaged_learn once it is measured. A
  * compensator, which decides the commands of a window, begins with the rest of its last plan, and calls
- * hsep_averaged_predict for other commands that it tries over its preview; the last ones count. A window
- * predicted and not measured yet is part of the block. Positions are relative to the start, signals newest first
- * (hsep_window.h).
+ * hsep_averaged_predict for other commands that it tries over its preview; the last ones count. A window predicted and
+ * not measured yet is part of the block. Positions are relative to the start, signals newest first (hsep_window.h).
  */
 #ifndef HSEP_AVERAGED_MODEL_H
 #define HSEP_AVERAGED_MODEL_H

@@ -1,8 +1,5 @@
 /* Expert of the residual: a regression on static features and lags with normal priors, counted as far as its own
- * variance allows; as predict/averaging/experts.py, which says how.
- *
- * Signals as hsep_window.h has them: newest first.
- */
+ * variance allows; as predict/averaging/experts.py, which says how. Signals are kept newest first (hsep_window.h). */
 #ifndef HSEP_EXPERTS_H
 #define HSEP_EXPERTS_H
 

@@ -1,7 +1,5 @@
-/* Motion before a run, estimated from its first window; as predict/averaging/start.py, which says how.
- *
- * Positions are relative to the start, signals newest first.
- */
+/* Motion before a run, estimated from its first window; as predict/averaging/start.py, which says how. Positions are
+ * relative to the start, signals newest first. */
 #ifndef HSEP_START_H
 #define HSEP_START_H
 
@@ -14,7 +12,7 @@ typedef struct {
     hsep_int Np, n;             /* samples measured and predicted */
     hsep_int n_states;          /* of the modes */
     hsep_int dead_time;         /* samples */
-    hsep_int states;            /* offsets in words: (n_states + dead_time,) state of a motion by one metre a sample */
+    hsep_int states;            /* (n_states + dead_time,) state of a motion by one metre a sample */
     hsep_int state;             /* (n_states + dead_time,) m, the one that is tried */
     hsep_int response;          /* (n + Np,) m, to it, oldest first */
     hsep_int responses;         /* (n_states, n) to each state of the modes alone, oldest first */
