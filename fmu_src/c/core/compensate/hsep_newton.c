@@ -130,7 +130,6 @@ static void newton_open(hsep_newton *self, const hsep_newton_task *task)
     if (self->is_physics) {
         hsep_planner_may_turn(task->planner);
     }
-    hsep_planner_change(task->planner);
     for (hsep_int k = 0; k < self->preview; k++) {
         target[k] = weight[k] * weight[k] * (task->x_d[k] - task->predictor->start - x_pb[self->preview - 1 - k]);
     }
@@ -600,7 +599,6 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
                 NEWTON_YIELD(16, work.open);
                 newton_copy(self, c, hsep_at(self, self->best));
                 hsep_planner_open(planner, task->x_d);
-                hsep_planner_change(planner);
             }
             hsep_planner_may_turn(planner); /* the model follows the friction */
             planner->change = self->bound;

@@ -157,6 +157,8 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int count = HSEP_N_DECIDED + splines->n, preview = splines->preview;
     hsep_real *moves = hsep_at(self, self->moves), last = self->x_d_before[2];
+    self->changes = 1;
+    self->solved = self->knots;
     planner_totals(self, x_d, count, preview, hsep_at(self, self->total), hsep_at(self, self->own));
     for (hsep_int k = 0; k < preview; k++) {
         const hsep_real step = x_d[k] - last;
@@ -265,22 +267,14 @@ HSEP_API void hsep_planner_may_turn(hsep_planner *self)
     hsep_zero(hsep_at(self, self->moves), hsep_planner_splines(self)->preview);
 }
 
-HSEP_API void hsep_planner_change(hsep_planner *self)
-{
-    const hsep_int all = HSEP_N_DECIDED + hsep_planner_splines(self)->n;
-    self->changes = 1;
-    self->solved = self->knots;
-    (void)planner_third(self, hsep_at(self, self->c), all, hsep_at(self, self->third));
-}
-
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)
 {
-    const hsep_int n = self->solved.m;
+    const hsep_splines *splines = hsep_planner_splines(self);
+    const hsep_int n = self->solved.m, given = HSEP_N_DECIDED + (self->changes ? splines->n : 0);
     const hsep_problem problem = hsep_planner_problem(self);
-    hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0;
-    hsep_splines_jerk(
-        hsep_planner_splines(self), jerk_weight, hsep_at(self, self->third), planner_first(self), problem.products,
-        problem.c);
+    hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0, *third = hsep_at(self, self->third);
+    (void)planner_third(self, hsep_at(self, self->c), given, third);
+    hsep_splines_jerk(splines, jerk_weight, third, planner_first(self), problem.products, problem.c);
     hsep_knots_narrow(&self->solved, problem.c, problem.v);
     hsep_knots_add(&self->solved, problem.products, P, problem.c);
     for (hsep_int i = 0; i < n; i++) {
@@ -299,7 +293,6 @@ HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], c
     hsep_real *v = hsep_planner_linear(self);
     self->changes = 0;
     self->solved = hsep_knots_of(splines->n, 0);
-    (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED, hsep_at(self, self->third));
     for (hsep_int j = 0; j < splines->n; j++) { /* W' target */
         const hsep_int begin = j * splines->spacing;
         v[j] = hsep_dot(filtered, target + begin, splines->preview - begin);
@@ -332,7 +325,6 @@ HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
     hsep_real *P = hsep_planner_quadratic(self), *delta = problem.low;
     self->change = 1.0;
     hsep_planner_open(self, x_d);
-    hsep_planner_change(self);
     self->solved = hsep_knots_of(n, 0);
     for (hsep_int k = 0; k < splines->preview; k++) {
         delta[k] = hsep_planner_delta(self, k);

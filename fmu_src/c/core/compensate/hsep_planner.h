@@ -77,8 +77,14 @@ static inline hsep_int hsep_planner_pinned(const hsep_planner *self)
     return self->n_pinned * hsep_planner_splines(self)->spacing;
 }
 
-/* Begin plans of a window. x_d: commanded positions, m, (preview,). */
+/* Begin plans of a window. x_d: commanded positions, m, (preview,). The cost of the next one is 1/2 x' P x - v' x of a
+ * change of the last one by the splines of the planner's knots, unless hsep_planner_aim or _end sets another one. The
+ * caller sets the triangle P of m rows and v, (m,), m; hsep_planner_complete adds the jerk's, times a weight, to v, and
+ * to P with what makes it positive definite. */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
+static inline hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
+static inline hsep_real *hsep_planner_linear(hsep_planner *self) { return hsep_planner_problem(self).v; }
+HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight);
 
 /* Let plans of this window turn where no_reversal forbids it. */
 HSEP_API void hsep_planner_may_turn(hsep_planner *self);
@@ -91,14 +97,6 @@ HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], c
  * as smooth as a short part of a plan allows. It ends where the last plan does. x_d: as hsep_planner_open has it. Cost:
  * 30 n spacing and 15 preview multiply-adds, and those of hsep_knots_add. */
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
-
-/* Begin a cost 1/2 x' P x - v' x of a change of the last plan by the splines of the planner's knots, which the caller
- * sets: the triangle P of m rows, and v, (m,), m; hsep_planner_complete adds the jerk's, times a weight, to v, and to P
- * with what makes it positive definite. */
-HSEP_API void hsep_planner_change(hsep_planner *self);
-static inline hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
-static inline hsep_real *hsep_planner_linear(hsep_planner *self) { return hsep_planner_problem(self).v; }
-HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight);
 
 /* Plan at this cost, which is used up. The first samples (hsep_planner_pinned) stay as they are in a change of the last
  * plan, and in a bounded plan, which is solved within the tolerance. Cost: m^3 / 6 multiply-adds. */

@@ -1,6 +1,6 @@
 /* Uncertainty of a prediction: the variance of its error against the measured position, learned from earlier windows;
- * as predict/uncertainty.py, which says how and why. Signals are kept newest first (hsep_window.h). Cost of a window: 50
- * n operations each. */
+ * as predict/uncertainty.py, which says how and why. Signals are kept newest first (hsep_window.h). Cost of a window:
+ * 50 n operations each. */
 #ifndef HSEP_UNCERTAINTY_H
 #define HSEP_UNCERTAINTY_H
 
