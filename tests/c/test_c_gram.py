@@ -30,17 +30,12 @@ class CGram:
     def __init__(self, n: int) -> None:
         self.library, self.n = c_core.library(PREDICTOR), n
         self.library.hsep_gram_size.restype = self.library.hsep_gram_square.restype = ctypes.c_double
-        self.library.hsep_gram_row.restype = ctypes.POINTER(ctypes.c_double)
         self.block = np.zeros(int(self.library.hsep_gram_size(ctypes.c_uint64(n))) // 8)
         self._block = pointer(self.block)
         self.library.hsep_gram_init(self._block, ctypes.c_uint64(n))
 
     def fold(self, rows: Array, target: Array) -> None:
-        for row in np.column_stack((rows[:, ::-1], target)):
-            place = self.library.hsep_gram_row(self._block)
-            for j, value in enumerate(row.tolist()):
-                place[j] = value
-            self.library.hsep_gram_fold(self._block)
+        self.fold_over(rows, target, 1)
 
     def fold_over(self, rows: Array, target: Array, repetitions: int) -> None:
         stacked = np.ascontiguousarray(np.column_stack((rows[:, ::-1], target)))
