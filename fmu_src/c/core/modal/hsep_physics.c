@@ -191,7 +191,7 @@ HSEP_API void hsep_physics_abreast(hsep_physics *const models[], size_t count, h
             *command = physics_delay(models[i], *command);
         }
     }
-    hsep_zero(x, HSEP_PHYSICS_ABREAST * n);
+    memset(x, 0, HSEP_PHYSICS_ABREAST * n * sizeof(hsep_real));
     for (hsep_int mode = 0; mode < models[0]->n_modes; mode++) {
         physics_respond_abreast(models, count, mode, u, x, n);
     }
