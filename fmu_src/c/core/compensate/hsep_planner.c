@@ -152,6 +152,20 @@ static void planner_totals(
     }
 }
 
+/* Third differences of delta under the first count coefficients c, (preview,), m; return the sum of their squares. */
+static hsep_real planner_third(const hsep_planner *self, const hsep_real c[], hsep_int count, hsep_real third[])
+{
+    const hsep_splines *splines = hsep_planner_splines(self);
+    hsep_real now[HSEP_ORDERS], squares = 0.0;
+    hsep_differ_from(now, self->delta_before);
+    for (hsep_int k = 0; k < splines->preview; k++) {
+        hsep_differ(now, hsep_splines_sum(splines, c, count, k));
+        third[k] = now[3];
+        squares += third[k] * third[k];
+    }
+    return squares;
+}
+
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
@@ -160,6 +174,7 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
     self->changes = 1;
     self->solved = self->knots;
     planner_totals(self, x_d, count, preview, hsep_at(self, self->total), hsep_at(self, self->own));
+    (void)planner_third(self, hsep_at(self, self->c), count, hsep_at(self, self->third));
     for (hsep_int k = 0; k < preview; k++) {
         const hsep_real step = x_d[k] - last;
         moves[k] = self->no_reversal ? (hsep_real)((step > HSEP_QP_MOVES) - (step < -HSEP_QP_MOVES)) : 0.0;
@@ -221,20 +236,6 @@ static int planner_allow(const hsep_planner *self, const hsep_real way[])
     return 1;
 }
 
-/* Third differences of delta under the first count coefficients c, (preview,), m; return the sum of their squares. */
-static hsep_real planner_third(const hsep_planner *self, const hsep_real c[], hsep_int count, hsep_real third[])
-{
-    const hsep_splines *splines = hsep_planner_splines(self);
-    hsep_real now[HSEP_ORDERS], squares = 0.0;
-    hsep_differ_from(now, self->delta_before);
-    for (hsep_int k = 0; k < splines->preview; k++) {
-        hsep_differ(now, hsep_splines_sum(splines, c, count, k));
-        third[k] = now[3];
-        squares += third[k] * third[k];
-    }
-    return squares;
-}
-
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[])
 {
     return self->jerk_weight * planner_third(self, c, HSEP_N_DECIDED + hsep_planner_splines(self)->n, work);
@@ -270,10 +271,10 @@ HSEP_API void hsep_planner_may_turn(hsep_planner *self)
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int n = self->solved.m, given = HSEP_N_DECIDED + (self->changes ? splines->n : 0);
+    const hsep_int n = self->solved.m;
     const hsep_problem problem = hsep_planner_problem(self);
-    hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0, *third = hsep_at(self, self->third);
-    (void)planner_third(self, hsep_at(self, self->c), given, third);
+    const hsep_real *third = hsep_at(self, self->third);
+    hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0;
     hsep_splines_jerk(splines, jerk_weight, third, planner_first(self), problem.products, problem.c);
     hsep_knots_narrow(&self->solved, problem.c, problem.v);
     hsep_knots_add(&self->solved, problem.products, P, problem.c);
@@ -293,6 +294,7 @@ HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], c
     hsep_real *v = hsep_planner_linear(self);
     self->changes = 0;
     self->solved = hsep_knots_of(splines->n, 0);
+    (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED, hsep_at(self, self->third));
     for (hsep_int j = 0; j < splines->n; j++) { /* W' target */
         const hsep_int begin = j * splines->spacing;
         v[j] = hsep_dot(filtered, target + begin, splines->preview - begin);
