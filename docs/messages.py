@@ -119,6 +119,11 @@ FINDINGS: Mapping[str, Explanation] = {
         "The measured position is empty or `nan` in some rows.",
         "None is needed with `averaging = true`: they are left out. Without averaging such a log is refused.",
     ),
+    "moved at rest": Explanation(
+        "The axis moves while its command has rested for 0.3 s, further than its error ever was in motion: something "
+        "else moves it, as where a tool or a reel is changed.",
+        "None is needed: these samples count as missing, as a compensator would learn them as the command's.",
+    ),
     "rate": Explanation(
         "Sampling intervals differ; the rows are taken as if they were even.",
         "Record in the controller's own cycle rather than by a PC's clock, or take it at even times: `--resample`.",

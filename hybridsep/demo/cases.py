@@ -114,10 +114,8 @@ def demo_files(out: str | Path, *, full: bool = False) -> list[Path]:
     files = [out / name for name in ("index.html", "summary.json", *(["spiral_contour.png"] * full))]
     for case, name in list(MACHINES.items())[: len(MACHINES) if full else 1]:
         files += [out / f"{case}{what}{end}" for what in ("", "_compensated") for end in (".csv", ".png")]
-        files.append(out / f"{name}.state")
-        for model in ("HybridPredictor", "SepCompensator", "FeedDrive"):
-            files.append(out / "fmus" / f"{fmu_name(model, name)}.fmu")
-        files.append(out / "fmus" / "warm" / f"{fmu_name('SepCompensator', name)}.fmu")
+        fmus = [f"{fmu_name(model, name)}.fmu" for model in ("HybridPredictor", "SepCompensator", "FeedDrive")]
+        files += [out / f"{name}.state", *(out / "fmus" / one for one in fmus), out / "fmus" / "warm" / fmus[1]]
     return files
 
 

@@ -94,7 +94,10 @@ class ArxRun:
         self._delay = delay
         late = np.concatenate((x[delay:], np.full(min(delay, len(x)), np.nan)))
         self._y = late - x_d
-        self._lagged = _interpolated(self._y)
+        self._lagged, known = self._y.copy(), ~np.isnan(self._y)
+        if 1 < known.sum() < len(known):  # between measured samples: lines double the error of an ARX
+            between = Akima1DInterpolator(np.flatnonzero(known), self._y[known])
+            self._lagged[~known] = between(np.flatnonzero(~known))
         self._steps = np.diff(x_d, prepend=x_d[0])
         self._filled = np.concatenate((np.zeros(n), self._y))  # at rest before the first sample
         self._n_filled = 0
@@ -140,14 +143,6 @@ class ArxRun:
             denominator = np.concatenate(([1.0], -a))
             before = lfiltic([1.0], denominator, self._filled[begin : begin + n][::-1])
             return np.asarray(lfilter([1.0], denominator, forced, zi=before)[0])
-
-
-def _interpolated(y: Array) -> Array:
-    """Return a signal, ``(n,)``, with what is missing between measured samples: lines double the error of an ARX."""
-    measured, k = np.flatnonzero(~np.isnan(y)), np.arange(len(y))
-    if len(measured) in (len(y), 0, 1):
-        return y
-    return np.where(np.isnan(y), np.asarray(Akima1DInterpolator(measured, y[measured])(k)), y)
 
 
 ARX_LAGS = (20, 40)  # lags of the ARX models

@@ -55,7 +55,9 @@ class Verdict:
         if self.n_windows < WINDOWS_ENOUGH:
             lines.append(f"Judged by {counted(self.n_windows)} only")
         if self.n_rejected:
-            lines.append(_not_learned(self.n_rejected, self.n_missing, self.n_samples))
+            causes = ((self.n_missing, "missing"), (self.n_rejected - self.n_missing, "not plausible"))
+            why = ", ".join(f"{n} {cause}" for n, cause in causes if n)
+            lines.append(f"{self.n_rejected} of {self.n_samples} measurements were not learned: {why}")
         return "\n".join(f"{line}." for line in lines)
 
 
@@ -142,13 +144,6 @@ def _cause(ratios: Sequence[float], change: float, largest: float, later: Array 
     if peers and later is not None and all(_ratio(later[-1], later[peer]) <= 1.0 + ALIKE for peer in peers):
         return f"only the first {_N_EARLY} windows are worse, where hardly anything has been learned yet"
     return ""
-
-
-def _not_learned(n: int, n_missing: int, n_samples: int) -> str:
-    if 0 < n_missing < n:
-        return f"{n} of {n_samples} measurements were not learned: {n_missing} missing, {n - n_missing} not plausible"
-    were, why = "was" if n == 1 else "were", "missing" if n_missing else "not plausible"
-    return f"{n} of {n_samples} measurements {were} {why}, and not learned"
 
 
 def counted(n: int) -> str:

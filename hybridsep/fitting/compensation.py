@@ -273,13 +273,16 @@ class Tracking:
         """Return the errors in words, what binds them and, last, how they came about."""
         change_max = "none" if self.change_max is None else shown.words(self.change_max, ".4g")
         monitored = shown.words(self.following_error_max, ".4g") if self.following_error_max > 0.0 else ""
+        figures = (("RMS", "rms"), ("largest error", "largest"))
+        better = " and ".join(what for what, one in figures if getattr(self.inverse, one) < getattr(self.hybrid, one))
         lines = [
             f"Tracking error (commanded minus measured, RMS) over {self.duration:.3g} s of the log: "
             f"{_words(self.none, shown)} as recorded; with the compensator about {_words(self.hybrid, shown)} by the "
             f"hybrid, with which the FMU starts, and about {_words(self.physics, shown)} by the physics model "
             "(compensate = physics).",
             f"A finite impulse response with friction's sign, fitted to the first half and inverted, would leave about "
-            f"{_words(self.inverse, shown)}, without limits and without learning on.{self._rival_words()}",
+            f"{_words(self.inverse, shown)}, without limits and without learning on."
+            + (f" That is better than the hybrid in {better}: such a filter of the command may do." if better else ""),
             f"change_max is {change_max}. {binding_words(self.limits.get('hybrid', {}))}",
         ]
         if self.change_max is not None:
@@ -326,12 +329,6 @@ class Tracking:
             trips,
             _HOW + (_UNEXPLAINED if self.physics.rms > _EXPLAINED * self.none.rms else ""),
         ]
-
-    def _rival_words(self) -> str:
-        """Return in what the rival is better than the hybrid, as a sentence; empty where it is not."""
-        sizes = (("RMS", "rms"), ("largest error", "largest"))
-        better = " and ".join(what for what, one in sizes if getattr(self.inverse, one) < getattr(self.hybrid, one))
-        return f" That is better than the hybrid in {better}: such a filter of the command may do." if better else ""
 
 
 def _words(error: ErrorSize, shown: DisplayUnits) -> str:

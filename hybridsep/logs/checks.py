@@ -10,6 +10,7 @@ import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -55,6 +56,10 @@ _USUAL = 0.98  # quantile of what is usual, beyond which are the samples that ar
 _HELD, _REPEATED = 0.1, 0.2
 """Way of the command, relative to its travel, while the measured position is held; and share of the samples in fast
 motion that repeat the one before, from which they are noted."""
+
+_RESTED, _STOOD, _BACK = 0.3, 0.1, 0.1
+"""Rest of a command, s, behind which something else moves an axis if it leaves where it stood for so many seconds by
+more than its error was ever beside the median in motion; and share of that within which it is back."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +120,7 @@ def check(log: Log) -> tuple[Finding, ...]:
     refused = (*_unit(log), *(_meaning(log, x_d, x, given) if given else ()))
     if refused:
         return refused
-    notes = (*_note_missing(log), *_note_rate(log), *_note_outliers(log), *_note_start(log))
+    notes = (*_note_missing(log), *_note_rate(log), *_note_outliers(log), *_note_start(log), *_note_moved_at_rest(log))
     notes += tuple(_note_held(log, given.lag_of_one if given else 0))
     return (*notes, *(_note_relation(log, x_d, x, given) if given else ()))
 
@@ -298,11 +303,9 @@ def _other_meaning(x_d: Array, x: Array, filled: Array, given: _Following) -> st
 
 def _as_units(gain: float) -> str:
     """Return the two units whose ratio a gain is, in words."""
-    for measured in POSITION_UNITS.values():
-        for commanded in POSITION_UNITS.values():
-            ratio = commanded.factor / measured.factor
-            if measured.si == commanded.si and abs(gain / ratio - 1.0) < _KNOWN:
-                return f": measured in {measured.name} and commanded in {commanded.name}?"
+    for x, x_d in product(POSITION_UNITS.values(), repeat=2):
+        if x.si == x_d.si and abs(gain * x.factor / x_d.factor - 1.0) < _KNOWN:
+            return f": measured in {x.name} and commanded in {x_d.name}?"
     return ""
 
 
@@ -352,6 +355,32 @@ def _note_missing(log: Log) -> Iterator[Finding]:
             f"first is sample {missing[0] + 1}: they are left out"
         )
         yield Finding("missing samples", words, {"n": float(len(missing))})
+
+
+def commanded(log: Log) -> Array:
+    """Return a segment's measured positions, ``(n,)``, NaN where something else moves the axis at a command's rest."""
+    at, error, x = np.arange(len(log.t)), log.x_meas - log.x_d, np.array(log.x_meas)
+    rests = at - np.maximum.accumulate(np.where(np.diff(log.x_d, prepend=log.x_d[0]), at, 0)) > _RESTED / log.T_s
+    edges, known = np.flatnonzero(np.diff(rests, prepend=False, append=False)), ~rests & np.isfinite(error)
+    most = np.max(np.abs(error[known] - np.median(error[known]))) if known.any() else np.inf
+    for first, end in edges.reshape(-1, 2).tolist():
+        away = np.abs(error[first:end] - np.median(error[first:end][: max(1, round(_STOOD / log.T_s))]))
+        far, near = np.flatnonzero(away > most), np.flatnonzero(away <= _BACK * most)
+        if len(far) and len(near) and near[0] < far[0]:
+            begins, back = near[near < far[0]][-1], near[near > far[-1]]
+            x[first + begins : first + back[0] if len(back) else end + round(_RESTED / log.T_s)] = np.nan
+    return x
+
+
+def _note_moved_at_rest(log: Log) -> Iterator[Finding]:
+    moved = np.concatenate([np.isnan(commanded(one)) & ~np.isnan(one.x_meas) for one in log.segments()])
+    if moved.any():
+        n, duration = int((np.diff(moved, prepend=False) & moved).sum()), float(moved.sum()) * log.T_s
+        words = (
+            f"something else moves the axis while its command rests, {n} time{'s' if n > 1 else ''}, the first at "
+            f"{log.t[np.argmax(moved)]:.4g} s, {duration:.3g} s in all: these samples are neither learned nor judged"
+        )
+        yield Finding("moved at rest", words, {"n": float(n), "duration": duration})
 
 
 def _note_rate(log: Log) -> Iterator[Finding]:

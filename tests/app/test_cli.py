@@ -24,7 +24,7 @@ def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: P
     log.write_text("\n".join(rows))
     out = hybridsep.done("backtest", log, "-m", "spring_mass_damper", "--json")
     assert json.loads(out)["n_samples"] == 1999
-    assert "1 of 2000 measurements was missing, and not learned" in json.loads(out)["verdict"]
+    assert "1 of 2000 measurements were not learned: 1 missing" in json.loads(out)["verdict"]
     said = hybridsep.refused("backtest", log, "-m", "spring_mass_damper", *predictor(averaging="false"))
     assert "1500 is missing; it is replayed with averaging alone (--set predictor.averaging=true)" in said
 

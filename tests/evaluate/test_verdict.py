@@ -87,10 +87,8 @@ def test_a_bad_beginning_is_told_from_a_bad_model() -> None:
 @pytest.mark.parametrize(
     ("n_missing", "n_rejected", "words"),
     [
-        (0, 7, "7 of 1200 measurements were not plausible, and not learned."),
-        (0, 1, "1 of 1200 measurements was not plausible, and not learned."),
-        (3, 3, "3 of 1200 measurements were missing, and not learned."),
-        (1, 1, "1 of 1200 measurements was missing, and not learned."),
+        (0, 7, "7 of 1200 measurements were not learned: 7 not plausible."),
+        (3, 3, "3 of 1200 measurements were not learned: 3 missing."),
         (3, 4, "4 of 1200 measurements were not learned: 3 missing, 1 not plausible."),
     ],
 )
@@ -135,4 +133,4 @@ def test_outliers_of_a_run_are_told() -> None:
         predictor, machine.new_plant(), staircase()[:1000], sensor=lambda k, x: x + 1e-3 if k in (555, 666) else x
     )
     assert run.n_rejected == 2
-    assert str(verdict_of(run)).endswith("2 of 1000 measurements were not plausible, and not learned.")
+    assert str(verdict_of(run)).endswith("2 of 1000 measurements were not learned: 2 not plausible.")

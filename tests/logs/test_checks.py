@@ -18,7 +18,7 @@ from scipy.signal import chirp, lfilter
 from hybridsep import ModalModel, Mode, load_machine, simulate, spiral
 from hybridsep.base.errors import LogError
 from hybridsep.base.signals import Array
-from hybridsep.logs.checks import check, checked
+from hybridsep.logs.checks import check, checked, commanded
 from hybridsep.logs.log import Log, read_log
 
 GOOD_CASES = CASES.parent / "good"
@@ -323,7 +323,15 @@ NOTES: dict[str, Callable[[Log], Log]] = {
     ),
     "outliers": lambda log: replace(log, x_meas=log.x_meas + 0.1 * (np.arange(len(log.t)) == 500)),
     "clipped": lambda log: replace(log, x_meas=np.minimum(log.x_meas, 0.8 * float(log.x_meas.max()))),
+    "moved at rest": lambda log: rested(log, 0.02),
 }
+
+
+def rested(log: Log, size: float) -> Log:
+    """Return a log with a rest of 1.5 s behind it, in which something else moves the axis by a size, m, and back."""
+    rest, push = np.full(1500, log.x_d[-1]), size * np.pad(np.hanning(600), (500, 400))
+    end = log.x_meas[-1] + (rest[0] - log.x_meas[-1]) * -np.expm1(-np.arange(1500) / 6.0)
+    return log_of(np.concatenate((log.x_d, rest)), np.concatenate((log.x_meas, end + push)), log.T_s)
 
 
 def sines() -> Log:
@@ -341,6 +349,18 @@ def test_what_is_noted_has_a_statistic_and_changes_nothing(name: str) -> None:
     assert found[name].evidence
     assert name != "late" or "lags its command by 406 samples (0.406 s)" in found[name].words  # 6 of the drive
     assert str(found[name]).startswith(f"note: {name}: ")
+
+
+def test_what_moves_an_axis_at_rest_is_not_learned() -> None:
+    """Further than its error ever was in motion, until it is back: a quarter of a millimetre may be friction's."""
+    log = rested(sines(), 0.02)
+    gone = np.flatnonzero(np.isnan(commanded(log)))
+    assert (gone[0], gone[-1]) == (pytest.approx(3575, abs=75), pytest.approx(4025, abs=75))
+    assert not np.isnan(commanded(rested(sines(), 2.5e-4))).any()
+    (note,) = [one for one in check(log) if one.name == "moved at rest"]
+    assert note.evidence == {"n": 1.0, "duration": pytest.approx(1e-3 * len(gone))}
+    away = replace(log, x_meas=np.concatenate((log.x_meas[:3800], np.full(700, log.x_meas[3800]))))  # not back
+    assert np.isnan(commanded(away)[3700:]).all()
 
 
 @pytest.mark.parametrize("rest", [0.1, 0.8])
