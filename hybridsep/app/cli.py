@@ -143,14 +143,6 @@ def main() -> None:
     sys.exit(_run())
 
 
-def _to_paste(error: HybridSepError) -> list[str]:
-    """Return this command with each of the options that would put an error right, to paste."""
-    options = error.options if isinstance(error, LogError) else ()
-    given = shlex.join(sys.argv[1:])
-    width = max((len(option) for option, _ in options), default=0)
-    return [f"  hybridsep {given} {option:{width}}  # {meaning}" for option, meaning in options]
-
-
 def _machine_files(arguments: Sequence[str]) -> str:
     """Return which machine files fit wrote for a command's log, or that it writes one, in words."""
     logs = [Path(one) for one in arguments if not one.startswith("-")]
@@ -175,7 +167,10 @@ def _run() -> int:
         _abandon_stdout()
         return 1
     except HybridSepError as error:
-        return _fail("\n".join([str(error), *_to_paste(error)]))
+        options = error.options if isinstance(error, LogError) else ()  # that would put it right, to paste
+        given, width = shlex.join(sys.argv[1:]), max((len(option) for option, _ in options), default=0)
+        more = (f"  hybridsep {given} {option:{width}}  # {meaning}" for option, meaning in options)
+        return _fail("\n".join([str(error), *more]))
     except OSError as error:
         if error.filename is None:  # files name theirs
             _abandon_stdout()

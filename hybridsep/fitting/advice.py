@@ -146,9 +146,8 @@ def _more_motion(judged: Judged) -> str:
     steps = [np.abs(np.diff(one.x_d)) for one in judged.replay.recordings]
     fastest = max(float(one.max(initial=0.0)) for one in steps)
     moving = sum(int((one > STANDSTILL * fastest).sum()) for one in steps) / sum(len(one) for one in steps)
-    if moving >= LITTLE_MOTION:
-        return ""
-    return f"; the axis moves in {100 * moving:.2g} % of the samples: record more motion"
+    words = f"; the axis moves in {100 * moving:.2g} % of the samples: record more motion"
+    return words if moving < LITTLE_MOTION else ""
 
 
 def _what_would_help(judged: Judged) -> str:

@@ -79,9 +79,8 @@ def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
     found = {entry: one.checked(given[one.name]) for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
     names = [parameter.name for parameter in Limits.parameters().values()]
     if found and (missing := [name for name in names if name not in given]):
-        verb = "is" if len(missing) == 1 else "are"
         raise ParameterError(
-            f"a compensator needs the drive's limits {', '.join(names)}; {', '.join(missing)} {verb} missing"
+            f"a compensator needs the drive's limits {', '.join(names)}; missing: {', '.join(missing)}"
         )
     return found
 
@@ -494,6 +493,5 @@ def _scaled(settings: CompensatorSettings, entry: str, factor: float) -> Compens
 def binding_words(shares: Mapping[str, float]) -> str:
     """Return which limits bind a compensated command, and in which share of its samples, in words."""
     each = ", ".join(f"{name} in {100 * share:.2g} %" for name, share in shares.items())
-    if not each:
-        return "No limit binds the compensated command."
-    return f"Limits bind the compensated command: {each} of the samples."
+    some = f"Limits bind the compensated command: {each} of the samples."
+    return some if each else "No limit binds the compensated command."

@@ -210,7 +210,12 @@ class Fit:
         archives = {what: path for what, path in files.items() if path.suffix == ".fmu"}
         for what in [*([] if report else ["report"]), *([] if fmus else archives)]:
             del files[what]
-        write_whole(files["machine file"], machine_text(self.machine, comments=self._comments()))
+        comments = [self.identification.structure]  # and what is no measurement
+        if self.machine.plant is not None:
+            comments.append(f"[plant]: {self.plant.words(self.judged.shown)}")
+        if self.machine.drive_limits is not None and self.machine.drive_limits.estimated:
+            comments.append(f"[drive_limits]: {LIMITS_WORDS}")
+        write_whole(files["machine file"], machine_text(self.machine, comments=comments))
         commands = commands_to_try(self.judged.replay.recordings)
         write_commands(files["commands to try"], commands, self.machine.T_s, self.logs[0].shown)
         write_whole(files["trained predictor"], self.trained)
@@ -236,15 +241,6 @@ class Fit:
             "judged": plain(self.judged.replay.figures()),
             "controller": plain(self.judged.controller) or {},
         }
-
-    def _comments(self) -> list[str]:
-        """Return the lines at the head of the machine file: the structure, and what is no measurement in it."""
-        lines = [self.identification.structure]
-        if self.machine.plant is not None:
-            lines.append(f"[plant]: {self.plant.words(self.judged.shown)}")
-        if self.machine.drive_limits is not None and self.machine.drive_limits.estimated:
-            lines.append(f"[drive_limits]: {LIMITS_WORDS}")
-        return lines
 
 
 @one_blas_thread

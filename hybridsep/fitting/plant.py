@@ -167,7 +167,15 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
     n = 4 * len(alone.model.modes)
 
     def plant(theta: Array, with_stiffness: bool) -> _Disturbed:
-        modes = [_moved(mode, *theta[4 * i : 4 * i + 4].tolist()) for i, mode in enumerate(alone.model.modes)]
+        modes = [
+            Mode(
+                one.f_n * math.exp(f_n),
+                one.zeta * math.exp(zeta),
+                one.alpha + a * one.omega**2,
+                one.beta + b * one.omega,
+            )
+            for one, (f_n, zeta, a, b) in zip(alone.model.modes, theta[:n].reshape(-1, 4).tolist(), strict=True)
+        ]
         f, kappa, spread = theta[n:].tolist()
         moved = ModalModel(modes, alone.model.dead_time)
         return _Disturbed(moved, scale * f, with_stiffness * scale * kappa / reach**2, fastest * math.exp(spread))
@@ -194,14 +202,6 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
             continue
         found.append(one)
     return found
-
-
-def _moved(mode: Mode, frequency: float, damping: float, alpha: float, beta: float) -> Mode:
-    """Return a mode with changes of log f_n, log zeta, alpha/ω² and beta/ω."""
-    w = mode.omega
-    return Mode(
-        mode.f_n * math.exp(frequency), mode.zeta * math.exp(damping), mode.alpha + alpha * w**2, mode.beta + beta * w
-    )
 
 
 def _rms_of(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece], part: str) -> float:

@@ -266,9 +266,11 @@ def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Find
         )
         yield Finding("hardly follows", words, evidence, refused=True)
     elif given.left < _POOR and (max(gains) < _GAINS[0] or min(gains) > _GAINS[1]):
-        gain = given.gain  # above a drive's bandwidth the other is smaller
+        gain, units = given.gain, product(POSITION_UNITS.values(), repeat=2)  # above a bandwidth the other is smaller
+        meant = ((a, b) for a, b in units if a.si == b.si and abs(gain * a.factor / b.factor - 1.0) < _KNOWN)
+        said = next((f": measured in {a.name} and commanded in {b.name}?" for a, b in meant), "")
         words = (
-            f"the measured position moves {gain:.4g} times as far as the commanded one{_as_units(gain)}: state the "
+            f"the measured position moves {gain:.4g} times as far as the commanded one{said}: state the "
             "unit of each column in its name, such as 'x [mm]', or name another column (--x NAME)"
         )
         yield Finding("scale", words, evidence, refused=True)
@@ -299,14 +301,6 @@ def _other_meaning(x_d: Array, x: Array, filled: Array, given: _Following) -> st
         "velocity": min(following(x_d, np.cumsum(filled)).left, following(np.cumsum(x_d - x_d[0]), x).left),
     }
     return next((name for name, left in found.items() if _BETTER * left < given.left), "")
-
-
-def _as_units(gain: float) -> str:
-    """Return the two units whose ratio a gain is, in words."""
-    for x, x_d in product(POSITION_UNITS.values(), repeat=2):
-        if x.si == x_d.si and abs(gain * x.factor / x_d.factor - 1.0) < _KNOWN:
-            return f": measured in {x.name} and commanded in {x_d.name}?"
-    return ""
 
 
 # What is noted

@@ -177,7 +177,7 @@ def test_all_three_limits_are_needed() -> None:
     assert drive_limits({"period": 0.01}) == {}
     found = drive_limits({"v_max": 1.0, "a_max": 2.0, "j_max": 3.0, "change_max": 1e-4})
     assert found == {"velocity": 1.0, "acceleration": 2.0, "jerk": 3.0, "change_max": 1e-4}
-    with pytest.raises(ParameterError, match=r"limits v_max, a_max, j_max; a_max, j_max are missing"):
+    with pytest.raises(ParameterError, match=r"limits v_max, a_max, j_max; missing: a_max, j_max"):
         drive_limits({"v_max": 1.0})
 
 

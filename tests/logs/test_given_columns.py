@@ -250,7 +250,7 @@ def test_units_after_a_comma() -> None:
         ({"name": "../x"}, r"name .* must be a letter, then .* got '\.\./x'"),
         ({"name": 5}, "must be a letter, then .* got 5"),
         ({"v_max": math.nan, "a_max": 1.0, "j_max": 10.0}, "v_max must be finite, got nan"),
-        ({"v_max": 1.0}, "a_max, j_max are missing"),
+        ({"v_max": 1.0}, "missing: a_max, j_max"),
         ({"speed": 1.0}, "got 'speed'"),
         ({"Np": 0.5}, "Np must be a whole number, got 0.5"),
     ],
