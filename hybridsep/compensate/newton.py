@@ -256,10 +256,12 @@ the bounds: from that of ``EXACT`` a plan within limits that its command just ke
 window.
 """
 
-FIRST_REACH, _LEAST_REACH, _REACH = 0.1, 0.03, 0.5
+FIRST_REACH, _LEAST_REACH, _REACH, _WIDER, _MOST_REACH = 0.1, 0.03, 0.5, 2.0, 1.0
 """Half of the change of velocity that friction's slope is taken over: relative to the model's velocity scale, in the
 first step of a run and at least; and relative to what the last step has changed of the velocity, or would have (RMS). A
-slope over less is blind to a sign that changes nearby, and no way down; one over more sees signs that stay."""
+slope over less is blind to a sign that changes nearby, and no way down; one over more sees signs that stay. So where no
+length of a step lowers the cost the next one looks farther by a factor, up to the most: over the same change it would
+be the same step."""
 
 TWICE, THRICE = 15, 5
 """Samples that a plan has from which on it makes two Newton steps, and windows in a plan below which it makes three: a
@@ -326,9 +328,9 @@ class AveragedPlanner:
         if found is None:
             return start, reach
         change = found - start.coefficients
-        reach = max(_LEAST_REACH, _REACH * self.model.speed(self.basis.values @ change))
+        next_reach = max(_LEAST_REACH, _REACH * self.model.speed(self.basis.values @ change))
         for length in _LENGTHS:
             end = self.point(start.coefficients + length * change)
             if is_better(end.cost, start.cost):
-                return end, reach
-        return start, reach
+                return end, next_reach
+        return start, max(next_reach, min(_WIDER * reach, _MOST_REACH))

@@ -310,6 +310,8 @@ static void newton_judge(hsep_newton *self, const hsep_newton_task *task)
         for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
             c[j] = best[j] + shorter * (c[j] - best[j]);
         }
+    } else {
+        self->reach = self->wider;
     }
 }
 
@@ -620,7 +622,9 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
             self->gains = 0;
             self->tries = HSEP_NEWTON_TRIES;
             if (self->status != HSEP_PLAN_FAILED) {
+                self->wider = hsep_fmin(HSEP_NEWTON_WIDER * self->reach, HSEP_NEWTON_MOST_REACH);
                 self->reach = newton_next_reach(self, task);
+                self->wider = hsep_fmax(self->reach, self->wider);
                 self->tries = 0;
             }
             while (self->tries < HSEP_NEWTON_TRIES) {

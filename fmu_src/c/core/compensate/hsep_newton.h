@@ -39,7 +39,8 @@ typedef struct {
     hsep_int steps;         /* those done, */
     hsep_int gains;         /* whether the last one lowered the cost, */
     hsep_int tries;         /* and lengths of it that were tried */
-    hsep_real reach;        /* of friction's slope in it, relative to the velocity scale */
+    hsep_real reach;        /* of friction's slope in it, relative to the velocity scale, */
+    hsep_real wider;        /* and in the next one where no length of it lowers the cost */
     hsep_int samples;       /* samples that are predicted, */
     hsep_int spline;        /* splines whose change of x_h, or row of the programme, is computed */
     hsep_int status;        /* hsep_plan_status of the programme that is being solved */
@@ -71,7 +72,7 @@ typedef struct {
     hsep_int physics; /* G_pb at the beginning of the window, */
     hsep_int trial;   /* and for a trial */
 } hsep_newton;
-HSEP_ASSERT_WORDS(hsep_newton, 45);
+HSEP_ASSERT_WORDS(hsep_newton, 46);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
