@@ -193,7 +193,7 @@ def test_its_weights_are_the_formula(like: Array | None) -> None:
     stack = Stack.init()
     for predicted, measured in windows:
         stack = stack.update(predicted, measured, 0.0, like)
-    fades = (CONSTANTS.gamma, 1.0)
+    fades = (1.0 - CONSTANTS.renewal, 1.0)
     squares = [0.0] * (N_EXPERTS + 1)
     for fade, (predicted, measured) in zip(fades, windows, strict=True):
         for i, one in enumerate((*predicted, np.zeros(NP))):

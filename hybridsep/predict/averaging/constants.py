@@ -19,6 +19,9 @@ class AveragingConstants:
     kappa_of_plans: float = 10.0
     # factor by which the stack's evidence fades from window to window: 0.9 or 0.98 change errors by 1 to 3 %
     gamma: float = 0.95
+    # share of a window's evidence that each one takes from those before it, where that is more: they count as the
+    # square of their number, since experts learn. Without, recordings of some windows have to 1.4 times the error
+    renewal: float = 0.67
     # lags of the command's expert, and of its increments, which may reach beyond the window before: with 50 instead of
     # 20 errors are 2 % less on drives of modes, 8 % more on drives of two masses, and a third less where the physics
     # model is bad; more than 36 cost more than four million instructions in the dearest sample

@@ -18,9 +18,9 @@ _ROUNDING = 1e-6  # what rounding may have added to the sum of the weights
 class Stack:
     """Weights ``π ≥ 0``, ``Σπ ≤ 1`` of experts; the remainder is the prediction 0, the physics model's.
 
-    ``π = argmin ‖e − F π‖² + κ s² n ‖π − π₀‖²`` over the windows so far, their evidence fading by ``γ`` a window, with
-    the mean square ``s²`` of the best expert and ``n`` samples of a window: without evidence ``π = π₀``. In the stack
-    of plans ``π₀`` are the weights of the other one, and ``κ`` is larger.
+    ``π = argmin ‖e − F π‖² + κ s² n ‖π − π₀‖²`` over the windows so far, their evidence fading by ``γ`` a window, at
+    first faster, as experts learn, with the mean square ``s²`` of the best expert and ``n`` samples of a window:
+    without evidence ``π = π₀``. In the stack of plans ``π₀`` are the weights of the other one, and ``κ`` is larger.
     """
 
     weights: Array  # (n_experts,): ``π``
@@ -43,7 +43,8 @@ class Stack:
         predictions, if it is that of plans.
         """
         prior, kappa = (_first_weights(), CONSTANTS.kappa) if like is None else (like, CONSTANTS.kappa_of_plans)
-        gamma, n = CONSTANTS.gamma, len(measured)
+        n, before = len(measured), float(self.evidence[1])
+        gamma = min(CONSTANTS.gamma, max(before - CONSTANTS.renewal * n, 0.0) / max(before, n))
         gram = gamma * self.gram + predicted @ predicted.T
         cross = gamma * self.cross + predicted @ measured
         evidence = gamma * self.evidence + np.array([measured @ measured, n])

@@ -153,16 +153,18 @@ static inline void hsep_stack_update(
     hsep_stack *self, const hsep_stack_products *products, hsep_real least, const hsep_real like[])
 {
     hsep_real H[HSEP_N_EXPERTS][HSEP_N_EXPERTS], l[HSEP_N_EXPERTS];
-    self->evidence[0] = HSEP_AVERAGING_GAMMA * self->evidence[0] + products->of[HSEP_N_EXPERTS][HSEP_N_EXPERTS];
-    self->evidence[1] = HSEP_AVERAGING_GAMMA * self->evidence[1] + products->n;
+    const hsep_real before = self->evidence[1], left = hsep_fmax(before - HSEP_AVERAGING_RENEWAL * products->n, 0.0);
+    const hsep_real gamma = hsep_fmin(HSEP_AVERAGING_GAMMA, left / hsep_fmax(before, products->n));
+    self->evidence[0] = gamma * self->evidence[0] + products->of[HSEP_N_EXPERTS][HSEP_N_EXPERTS];
+    self->evidence[1] = gamma * self->evidence[1] + products->n;
     hsep_real best = self->evidence[0]; /* of the prediction 0, which is always there */
     for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         for (hsep_int j = 0; j < HSEP_N_EXPERTS; j++) {
             hsep_real *gram = &self->gram[HSEP_N_EXPERTS * i + j];
-            *gram = HSEP_AVERAGING_GAMMA * *gram + products->of[i < j ? i : j][i < j ? j : i];
+            *gram = gamma * *gram + products->of[i < j ? i : j][i < j ? j : i];
             H[i][j] = *gram;
         }
-        self->cross[i] = HSEP_AVERAGING_GAMMA * self->cross[i] + products->of[i][HSEP_N_EXPERTS];
+        self->cross[i] = gamma * self->cross[i] + products->of[i][HSEP_N_EXPERTS];
         best = hsep_fmin(best, self->evidence[0] - 2.0 * self->cross[i] + H[i][i]);
     }
     const hsep_real square = hsep_fmax(hsep_fmax(best / self->evidence[1], least), HSEP_STACKING_LEAST_SQUARE);
