@@ -47,11 +47,9 @@ class Stack:
         gamma = min(CONSTANTS.gamma, max(before - CONSTANTS.renewal * n, 0.0) / max(before, n))
         gram = gamma * self.gram + predicted @ predicted.T
         cross = gamma * self.cross + predicted @ measured
-        evidence = gamma * self.evidence + np.array([measured @ measured, n])
-        total, rows = evidence.tolist()
-        errors = total - 2.0 * cross + np.diag(gram)
-        best = max(min(float(errors.min()), total) / rows, least, _LEAST_SQUARE)
-        ridge = kappa * best * n
+        total, rows = evidence = gamma * self.evidence + np.array([measured @ measured, n])
+        least_sum = float(np.min(total - 2.0 * cross + np.diag(gram), initial=total))
+        ridge = kappa * max(least_sum / rows, least, _LEAST_SQUARE) * n
         weights = simplex_minimum(gram + ridge * np.eye(len(EXPERTS)), cross + ridge * prior)
         return Stack(weights, gram, cross, evidence)
 
@@ -96,11 +94,9 @@ def simplex_minimum(hessian: Array, linear: Array) -> Array:
     for size in range(1, n + 1):
         supports = np.array(list(combinations(range(n), size)))
         H, free = hessian[supports[:, :, None], supports[:, None, :]], linear[supports]
-        inverse = _solved(H, np.stack((free, np.ones_like(free)), axis=-1))
-        found, of_ones = inverse[..., 0], inverse[..., 1]
-        excess = found.sum(axis=-1) - 1.0
-        active = excess > 0.0  # then Σπ = 1
-        found[active] -= (excess / of_ones.sum(axis=-1))[active, None] * of_ones[active]
+        found, of_ones = np.moveaxis(_solved(H, np.stack((free, np.ones_like(free)), axis=-1)), -1, 0)
+        excess = np.maximum(found.sum(axis=-1) - 1.0, 0.0)  # then Σπ = 1
+        found -= (excess / of_ones.sum(axis=-1))[:, None] * of_ones
         cost = 0.5 * np.einsum("si,sij,sj->s", found, H, found) - np.einsum("si,si->s", free, found)
         cost[~(found >= 0.0).all(axis=-1)] = np.inf
         first = int(cost.argmin())

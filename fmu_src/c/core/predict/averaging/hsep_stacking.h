@@ -167,9 +167,9 @@ static inline void hsep_stack_update(
         self->cross[i] = gamma * self->cross[i] + products->of[i][HSEP_N_EXPERTS];
         best = hsep_fmin(best, self->evidence[0] - 2.0 * self->cross[i] + H[i][i]);
     }
-    const hsep_real square = hsep_fmax(hsep_fmax(best / self->evidence[1], least), HSEP_STACKING_LEAST_SQUARE);
     const hsep_real kappa = like != NULL ? HSEP_AVERAGING_KAPPA_OF_PLANS : HSEP_AVERAGING_KAPPA;
-    const hsep_real ridge = kappa * square * products->n;
+    best = hsep_fmax(hsep_fmax(best / self->evidence[1], least), HSEP_STACKING_LEAST_SQUARE);
+    const hsep_real ridge = kappa * best * products->n;
     for (hsep_int i = 0; i < HSEP_N_EXPERTS; i++) {
         H[i][i] += ridge;
         l[i] = self->cross[i] + ridge * (like != NULL ? like[i] : hsep_expert_of(i).first_weight);
