@@ -88,8 +88,8 @@ FINDINGS: Mapping[str, Explanation] = {
         "Unwrap it before, as by `numpy.unwrap(x, period=...)` with the message's period, or record it with more bits.",
     ),
     "unit": Explanation(
-        "No unit is stated, and the positions are not plausible in metres: too large a travel or acceleration.",
-        "Give `--unit`.",
+        "Positions that no axis has in metres: too large a travel or acceleration; refused where no unit is stated.",
+        "Give `--unit`, or another one.",
     ),
     "columns swapped": Explanation(
         "The commanded position follows the measured one as a drive follows its command, and not the other way round.",

@@ -117,11 +117,11 @@ def check(log: Log) -> tuple[Finding, ...]:
     x_d, x = log.x_d[part], log.x_meas[part].copy()
     x[_spikes(x, _travel(x_d))[0]] = np.nan
     given = following(x_d, x) if np.isfinite(x).sum() >= _SAMPLES_MIN else None
-    refused = (*_unit(log), *(_meaning(log, x_d, x, given) if given else ()))
-    if refused:
-        return refused
-    notes = (*_note_missing(log), *_note_rate(log), *_note_outliers(log), *_note_start(log), *_note_moved_at_rest(log))
-    notes += tuple(_note_held(log, given.lag_of_one if given else 0))
+    found = (*_unit(log), *(_meaning(log, x_d, x, given) if given else ()))
+    if any(one.refused for one in found):
+        return found
+    notes = (*found, *_note_missing(log), *_note_rate(log), *_note_outliers(log), *_note_start(log))
+    notes += (*_note_moved_at_rest(log), *_note_held(log, given.lag_of_one if given else 0))
     return (*notes, *(_note_relation(log, x_d, x, given) if given else ()))
 
 
@@ -169,8 +169,8 @@ def _wraps(log: Log) -> Iterator[Finding]:
 
 
 def _unit(log: Log) -> Iterator[Finding]:
-    """Find positions that no axis has in metres, where nothing states their unit."""
-    if log.unit != "m" or log.unit_stated:
+    """Find positions that no axis has in metres; they are refused where nothing states their unit."""
+    if log.unit != "m":
         return
     accelerations = [
         np.abs(one.x_d[2 * _OVER :] - 2.0 * one.x_d[_OVER:-_OVER] + one.x_d[: -2 * _OVER]) / (_OVER * log.T_s) ** 2
@@ -182,10 +182,11 @@ def _unit(log: Log) -> Iterator[Finding]:
     if travel <= _TRAVEL_MAX and usual <= _ACCELERATION_MAX:
         return
     words = (
-        f"read in m, {travel:.4g} m of travel and {usual:.4g} m/s² of acceleration are more than a feed axis has: "
-        "the positions are rather in mm, µm (--unit um) or, of a rotary axis, deg"
+        f"read in {log.file_unit or 'm'}, {travel:.4g} m of travel and {usual:.4g} m/s² of acceleration are more than "
+        "a feed axis has: are the positions in mm, µm or, of a rotary axis, deg?"
     )
-    yield Finding("unit", words, {"travel": travel, "acceleration": usual}, refused=True, options=UNIT_OPTIONS)
+    evidence, stated = {"travel": travel, "acceleration": usual}, log.unit_stated
+    yield Finding("unit", words, evidence, refused=not stated, options=() if stated else UNIT_OPTIONS)
 
 
 class _Following(NamedTuple):

@@ -27,7 +27,7 @@ POSITION_UNITS: Mapping[str, Unit] = {
 }
 """Units of positions by name; a log's positions are read in metres, or in radians where their unit is an angle."""
 
-UNIT_OPTIONS = (("--unit mm", "a linear axis in mm"), ("--unit deg", "a rotary axis or a joint in degrees"))
+UNIT_OPTIONS = (("--unit mm", "a linear axis in mm"), ("--unit um", "in µm"), ("--unit deg", "a joint in degrees"))
 """Options that say the unit of a log that states none, each with what it means."""
 
 TIME_UNITS: Mapping[str, Unit] = _units("s", {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0})

@@ -267,6 +267,12 @@ FAULTS: dict[str, tuple[str, Callable[[Log], Log]]] = {
 }
 
 
+def test_a_stated_unit_that_no_axis_has_is_noted() -> None:
+    log = moves()
+    found = check(replace(log, x_d=1e4 * log.x_d, x_meas=1e4 * log.x_meas, file_unit="mm", unit_stated=True))
+    assert [(one.name, one.refused, one.options) for one in found if one.name == "unit"] == [("unit", False, ())]
+
+
 OF_A_SWEPT_SINE = ("flipped", "mm for m", "deg for rad", "swapped", "following error", "one column")
 
 
