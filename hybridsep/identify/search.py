@@ -98,11 +98,15 @@ def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, ra
     if not bases:
         return []
     base = min(bases, key=lambda fit: fit.rms).theta[: 2 * n_modes]
-    if structure.lag:
-        slow = np.log([0.03 * rate, 0.7, 3.0 * rate])  # integrators beside a fast loop, or a feed-forward
-        return [*(np.append(base, np.log(factor * rate)) for factor in (0.5, 3.0)), slow]
     fastest = 0.5 * np.pi / T_s
     added = np.exp(np.linspace(np.log(rate), np.log(fastest), 6)[1:]) if fastest > rate else [fastest]
+    if structure.lag:
+        lags = [np.append(base, np.log(factor * rate)) for factor in (0.5, 3.0)]
+        if n_modes == 1:
+            slow = np.log([0.03 * rate, 0.7, 3.0 * rate])  # integrators beside a fast loop, or a feed-forward
+            return [*lags, slow]
+        one = min((fit for other, fit in known.items() if other.n_modes == 1 and other.lag), key=lambda fit: fit.rms)
+        return [*lags, *(np.concatenate((np.log([omega, 0.1]), one.theta)) for omega in (0.5 * rate, *added[:3]))]
     return [np.concatenate((base, np.log([omega, 0.1]))) for omega in added]
 
 

@@ -120,7 +120,8 @@ def lag_mode(tau: float, gain: float = 1.0) -> Mode:
 
 _FORMS = (
     *(Structure(0), Structure(0, lag=True), Structure(1), Structure(1, zero=True)),
-    *(Structure(1, lag=True, zero=True), Structure(2, zero=True), Structure(3, zero=True)),
+    *(Structure(1, lag=True, zero=True), Structure(2, zero=True), Structure(2, lag=True, zero=True)),
+    Structure(3, zero=True),
 )
 STRUCTURES = tuple(replace(form, unit_gain=unit_gain) for form in _FORMS for unit_gain in (True, False))
 """Structures by number of parameters, the simplest first."""
