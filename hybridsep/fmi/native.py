@@ -37,8 +37,13 @@ from .weights import WEIGHTS_FILE
 _TRAJECTORY_MAGIC = b"HSEPTRJ1"
 
 
-def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights: bool = False) -> dict[str, bytes]:
-    """Return an FMU's files, name → content; arguments as of ``build_fmu``; FmuError if it cannot be compiled."""
+def files(
+    spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights: bool = False, reference: bool = True
+) -> dict[str, bytes]:
+    """Return an FMU's files, name → content; arguments as of ``build_fmu``; FmuError if it cannot be compiled.
+
+    ``reference``: whether it has a run to compare with, which takes a second or two.
+    """
     table, fmi = spec.table, spec.fmi
     model, name = table.model, table.name
     content = {f"sources/{file}": text for file, text in c_sources((fmi,)).items()}
@@ -57,14 +62,14 @@ def files(spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights:
             content[f"resources/trajectory_{n}.bin"] = binary
     if spec.weights is not None:
         content[f"resources/{WEIGHTS_FILE}"] = spec.weights
-    reference = reference_run(spec)
-    content |= documentation(spec, needs, filled("native_dependencies.txt"), reference, sources=compile_note(name, fmi))
+    run = reference_run(spec) if reference else {}
+    content |= documentation(spec, needs, filled("native_dependencies.txt"), run, sources=compile_note(name, fmi))
     guid = content_guid(content, table)
     content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
     content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, spec.weights if embed_weights else None).encode()
     content["sources/buildDescription.xml"] = build_description(name, fmi)
     content["modelDescription.xml"] = model_description(spec, guid, f"hybridsep {__version__}")
-    content |= reference
+    content |= run
     compiled = libraries(table.kind, targets or default_targets())
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}
 

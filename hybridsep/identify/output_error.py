@@ -6,6 +6,7 @@ projection (Golub, Pereyra, Inverse Problems 19 (2003) R1), so that the search i
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -120,35 +121,47 @@ class _Problem:
     def __init__(
         self, segments: Sequence[Segment], T_s: float, structure: Structure, delay: Delay, rows_max: int
     ) -> None:
-        self._structure, self._T_s, self._delay = structure, T_s, delay
+        self._structure, self._T_s, self._input_hold = structure, T_s, delay.input_hold
         used = [segment for segment in segments if segment.known[: segment.stop].sum() > 1]
         step = max(1, sum(s.stop for s in used) // rows_max)
         self._data = [
-            (delayed(s.u[: s.stop], delay.samples), s.y[: s.stop], np.flatnonzero(s.known[: s.stop])[::step])
+            (delayed(s.u[: s.stop], delay.samples), s.y[rows], rows)
             for s in used
+            for rows in [np.flatnonzero(s.known[: s.stop])[::step]]
         ]
+        # A derivative changes one mode: the others' responses are there already
+        self._responses = lru_cache(8 * len(used))(self._responses_of)
 
     def solve(self, theta: Array) -> tuple[Array, Array, float]:
         """Return residual, linear parameters and mean offset for one set of poles."""
-        blocks = [self._projected(theta, u, y, rows) for u, y, rows in self._data]
-        Phi, target = (np.concatenate(parts) for parts in zip(*((b[0], b[1]) for b in blocks), strict=True))
+        blocks = [self._signals(theta, i) for i in range(len(self._data))]
+        both = np.concatenate([without(free, signals).T for signals, free in blocks], axis=1)
+        Phi, target = both[:-1].T, both[-1]
         norms = np.linalg.norm(Phi, axis=0)
         norms[norms == 0] = 1.0
         linear: Array = np.linalg.lstsq(Phi / norms, target, rcond=1e-12)[0] / norms  # with columns of unit norm
-        offset = float(np.mean([target - columns @ linear for _, _, target, columns in blocks]))
-        return target - Phi @ linear, linear, offset
+        means = [signals.mean(axis=0) for signals, _ in blocks]
+        return target - Phi @ linear, linear, float(np.mean([one[-1] - one[:-1] @ linear for one in means]))
 
-    def _projected(self, theta: Array, u: Array, y: Array, rows: Indices) -> tuple[Array, Array, Array, Array]:
-        """Return columns and target without the part that offset and initial state explain, then the means of both.
+    def _signals(self, theta: Array, i: int) -> tuple[Array, Array]:
+        """Return columns and, last, the target; and what offset and initial states may add to them.
 
-        The filters run over every sample; the samples ``rows``, all of them measured, have residuals.
+        The filters run over every sample; some samples, all of them measured, have residuals.
         """
-        sections = sections_of(self._structure, theta, self._T_s, self._delay.input_hold)
-        columns, target = affine(self._structure, responses(self._structure, sections, u)[rows], y[rows])
-        free = free_responses(sections, len(u))[rows]
-        nuisance = np.column_stack((np.ones(len(free)), free))
-        both = without(nuisance, np.column_stack((columns, target)))
-        return both[:, :-1], both[:, -1], target.mean(keepdims=True), columns.mean(axis=0)
+        structure, (u, y, rows), m = self._structure, self._data[i], 2 * self._structure.n_modes
+        parts = [*theta[:m].reshape(-1, 2), *theta[m:].reshape(-1, 1)]
+        found = [self._responses(i, *part.tolist()) for part in parts]
+        forced = [one[:1] for one, _ in found] + [one[1:] for one, _ in found] or [u[None, rows]]
+        columns, target = affine(structure, np.concatenate(forced).T, y)
+        free = np.concatenate((np.ones((1, len(y))), *(one for _, one in found)))
+        return np.concatenate((columns.T, target[None])).T, free.T
+
+    def _responses_of(self, i: int, *theta: float) -> tuple[Array, Array]:
+        """Return the responses of one mode, or of the lag, to the command and to its initial states, ``(k, n)`` each."""
+        (u, _, rows), is_mode = self._data[i], len(theta) == 2
+        one = Structure(int(is_mode), lag=not is_mode, zero=self._structure.zero)
+        sections = sections_of(one, np.array(theta), self._T_s, self._input_hold)
+        return responses(one, sections, u).T[:, rows], free_responses(sections, len(u)).T[:, rows]
 
 
 def without(nuisance: Array, signals: Array) -> Array:
@@ -165,7 +178,7 @@ def affine(structure: Structure, columns: Array, y: Array) -> tuple[Array, Array
         return columns, y
     n = max(structure.n_modes + structure.lag, 1)
     first = columns[:, :1]
-    return np.column_stack((columns[:, 1:n] - first, columns[:, n:])), y - columns[:, 0]
+    return np.hstack((columns[:, 1:n] - first, columns[:, n:])), y - columns[:, 0]
 
 
 def fit_structure(
