@@ -29,6 +29,7 @@ library."""
 
 _ROUNDING = 0.1  # most that rounding may have of the largest difference of commands, from which motion is estimated
 _OVER = tuple(sorted({round(1.25**i) for i in range(40)}))  # samples that such a difference may be over
+_BENT, _REGULAR = 1e-3, 0.9  # bend of a command, in its largest, that counts; share of bends at every n-th sample
 _HELD, _STEPS = 0.1, 100  # quantile of the intervals between changes for which a command is held; fewer are steps
 
 _ZERO, _VARIES = 10.0, 0.999
@@ -57,6 +58,7 @@ _GAIN = 0.05  # relative gain from which on a limit twice as large, or a longer 
 _TRIED_MAX = 10_000  # leading samples on which a compensator is tried
 _AHEAD = (0.025, 0.05, 0.1, 0.2, 0.4)  # look-aheads, s, that are tried beside the machine's own and the model's
 _DEMANDING = 2000  # most samples of the stretch on which limits and look-aheads are tried
+_LIGHTER = 1e-3  # ``jerk_weight`` relative to the machine's with which plans that it binds leave less
 _LITTLE = 0.01  # share of the error without compensation below which errors are alike
 
 _EXPLAINED = 0.7  # share of the error that the physics model's compensation leaves, from which on it knows little
@@ -91,6 +93,24 @@ def held_for(x_d: Array) -> int:
     return int(np.quantile(intervals, _HELD)) if len(intervals) > _STEPS else 1
 
 
+def straight_for(x_d: Array) -> int:
+    """Return for how many samples each slope of a command is held, as by a coarse interpolator; 1 where it bends."""
+    bends = np.abs(np.diff(x_d, 2))
+    at = np.flatnonzero(bends > max(_BENT * bends.max(initial=0.0), 2.0 * _rounding(x_d)))
+    n = int(np.quantile(np.diff(at), _HELD)) if len(at) > _STEPS else 1
+    return n if np.bincount(at % n).max(initial=0) > _REGULAR * len(at) else 1
+
+
+def _rounding(x_d: Array) -> float:
+    """Return the step to which commands are rounded, m.
+
+    Rounding is white noise where they move, but not at every speed, and no more than their smallest change.
+    """
+    rough = np.abs(np.diff(x_d, 5))[x_d[5:] != x_d[:-5]]
+    noise = float(np.quantile(rough, 0.9)) / (1.645 * math.sqrt(252.0)) if len(rough) else 0.0
+    return min(resolution(x_d), math.sqrt(12.0) * noise)
+
+
 def _motion(x_d: Array, T_s: float) -> list[float]:
     """Return the largest velocity, acceleration and jerk of commands, ``(n,)``, without what holds and rounds them.
 
@@ -98,11 +118,7 @@ def _motion(x_d: Array, T_s: float) -> list[float]:
     """
     held = held_for(x_d)
     x_d, T_s = x_d[::held], held * T_s
-    # Rounding is white noise where the command moves, but not at every speed, and no more than its smallest change
-    rough = np.abs(np.diff(x_d, 5))[x_d[5:] != x_d[:-5]]
-    noise = float(np.quantile(rough, 0.9)) / (1.645 * math.sqrt(252.0)) if len(rough) else 0.0
-    rounding = min(resolution(x_d), math.sqrt(12.0) * noise)
-    found = []
+    rounding, found = _rounding(x_d), []
     for order in (1, 2, 3):
         sizes = {n: largest(np.diff(x_d[: len(x_d) // n * n].reshape(-1, n), order, axis=0)) for n in _OVER}
         n = next((n for n, size in sizes.items() if 2 ** (order - 1) * rounding <= _ROUNDING * size), 1)
@@ -182,6 +198,7 @@ class Ahead:
     preview: int  # samples
     left: float  # RMS of the error that is left, m
     limits: Mapping[str, float]  # as of :func:`~hybridsep.fitting.expected.limits_that_bind`
+    settings: tuple[str, ...] = ()  # the compensator's, with a smaller one of which less is left
 
 
 @dataclass(frozen=True)
@@ -205,7 +222,7 @@ class LookAheads:
         rows = []
         for one in self.tried:
             binds = ["look-ahead"] if self.longer(one) else []
-            binds += [f"{name} {100 * share:.2g} %" for name, share in one.limits.items()]
+            binds += [*one.settings, *(f"{name} {100 * share:.2g} %" for name, share in one.limits.items())]
             name = f"{1e3 * one.preview * self.T_s:.4g}{', chosen' if one.preview == self.chosen else ''}"
             sizes = f"{factor * one.left:.4g}", f"{one.left / self.off:.3f}"
             rows.append([name, *sizes, ", ".join(binds) or "nothing"])
@@ -266,6 +283,9 @@ class Tracking:
     largest: float  # servo error of the whole logs, m
     motion: Mapping[str, Sequence[float]]  # name of a limit → largest of the logs' commands, and the drive's, SI
     held: int  # samples for which each command is the same
+    straight: int  # and for which its slope is
+    rounding: float  # step of the commands, m
+    T_s: float
     look_aheads: LookAheads | None  # None where the model has no error to compensate
 
     def lines(self, shown: DisplayUnits) -> list[str]:
@@ -301,6 +321,17 @@ class Tracking:
             lines.append(
                 f"The log's commands are held, or rounded to the same, for {self.held} samples each; where their steps "
                 "exceed a limit, that bounds what the compensator adds."
+            )
+        elif self.straight > 1:
+            lines.append(
+                f"The log's commands run straight for {self.straight} samples each, as of an interpolator that is as "
+                "much slower: their bends count as jerk, and bound what the compensator adds where a limit binds."
+            )
+        _, most = self.motion.get("j_max", (0.0, math.inf))
+        if self.held == 1 and 4.0 * self.rounding > most * self.T_s**3:
+            lines.append(
+                f"The log's commands are rounded to {shown.words(self.rounding)}, by which alone their jerk is above "
+                "j_max: that bounds what the compensator adds; finer set points leave less."
             )
         factor, unit = shown.position
         for power, (name, sizes) in zip(("", "²", "³"), self.motion.items(), strict=False):
@@ -357,12 +388,13 @@ def expected_tracking(
     without = max((one.without for one in judged.values()), key=len)
     none, physics, hybrid = map(ErrorSize.of, (without, *(one.compensated for one in judged.values())))
     inverse, limits = _inverted(machine, first), (allowed.change_max, allowed.following_error_max)
-    motion, error = largest_motion(recordings, machine.T_s)
+    (motion, error), commands = largest_motion(recordings, machine.T_s), [one.x_d for one in recordings]
     drive = {} if allowed.limits is None else allowed.limits.to_fmi()
     reached = {name: (size, most) for size, (name, most) in zip(motion.tolist(), drive.items(), strict=False)}
     return Tracking(
         *(none, physics, hybrid, inverse, bound, costs, *limits, len(without) * machine.T_s),
-        *(error, reached, max((held_for(one.x_d) for one in recordings), default=1), ahead),
+        *(error, reached, max(map(held_for, commands), default=1), max(map(straight_for, commands), default=1)),
+        *(max(map(_rounding, commands), default=0.0), machine.T_s, ahead),
     )
 
 
@@ -452,7 +484,16 @@ class Stretch:
                 settings = settings.for_window(Np := settings.window(needed), needed)
             found = self.expected(settings, Np)
             bound = limits_that_bind(found.x_d, found.x_dm, known.T_s, own)
-            tried.append(Ahead(preview, rms(found.compensated), bound))
+            left, finer = rms(found.compensated), dict[str, Any](jerk_weight=_LIGHTER * settings.jerk_weight)
+            if (spacing := settings.spacing or 1) > 1:
+                finer["spacing"] = max(n for n in range(1, spacing) if spacing % n == 0)
+            binds = [
+                name
+                for name, value in finer.items()
+                if left > _LITTLE * self.off
+                and rms(self.expected(replace(settings, **{name: value}), Np).compensated) < (1.0 - _GAIN) * left
+            ]
+            tried.append(Ahead(preview, left, bound, tuple(binds)))
         is_rough = own.limits is not None and largest(np.diff(found.x_d, 3)) > own.limits.jerk * known.T_s**3
         return LookAheads(tuple(tried), chosen, self.off, len(found.x_d) * known.T_s, known.T_s, is_rough)
 
@@ -473,7 +514,8 @@ def _inverted(machine: Machine, recordings: Sequence[Recording]) -> ErrorSize:
     """Return the errors to be expected of the rival over the test samples, on the same drive."""
     settings = machine.compensator_predictor
     late, Np = settings.n_late, settings.Np
-    rival = FirInverse.fitted([in_time(*one.training, late) for one in recordings], Np)
+    reach = max(Np, machine.look_ahead)  # a slow drive remembers more than a window
+    rival = FirInverse.fitted([in_time(*one.training, late) for one in recordings], reach)
     discrete, errors = machine.model.discretise(settings.T_s, settings.input_hold), []
     for one in recordings if rival else ():
         x_d, x = in_time(one.x_d, one.x, late)

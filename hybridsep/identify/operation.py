@@ -14,7 +14,16 @@ from ..model.physics import ModalModel
 from .model import Alternative, IdentifiedModel
 from .output_error import Delay, Fit, Segment, as_segments, fit_structure, motion_split, simulated
 from .search import fit_near
-from .selection import HELD_OUT, Candidate, choose, compare_structures, held_out, well_damped, without_long_delay
+from .selection import (
+    HELD_OUT,
+    Candidate,
+    choose,
+    compare_structures,
+    held_out,
+    well_damped,
+    with_slow_part,
+    without_long_delay,
+)
 from .structure import STRUCTURES, Structure
 from .uncertainty import estimates
 
@@ -67,7 +76,8 @@ def identify_operation(
         raise IdentificationError(f"{part} cannot determine a model, because {reason}")
     structures = [structure for structure in STRUCTURES if structure.order <= order_max]
     candidates = compare_structures(segments, T_s, structures, progress)
-    chosen = well_damped(without_long_delay(choose(candidates), segments, T_s), segments, T_s)
+    chosen = with_slow_part(choose(candidates), candidates, segments, T_s)
+    chosen = well_damped(without_long_delay(chosen, segments, T_s), segments, T_s)
     candidates = list({one.structure: one for one in (*candidates, chosen)}.values())
     progress(f"{chosen.structure.name}: all samples", 0.95)
     fit = fit_near(segments, T_s, chosen.fit)
@@ -157,15 +167,16 @@ def _findings(
         )
     error = float(np.std(np.concatenate([(s.y - s.u)[s.known] for s in segments])))
     if fit.rms > _LEFT * error:
-        why = "friction, or a disturbance that repeats with the command, moves its modes by more than their standard "
+        why = "friction, a dead band, or what repeats with the command moves its modes by more than their standard "
         why += "deviations say; record faster" if fit.structure.order else "no loop is seen; record longer, or faster"
         findings.append(
             f"the loop is not identified: of a servo error of {shown.words(error)} (standard deviation) the model "
-            f"leaves {shown.words(fit.rms)}; {why} motion, or give the loop's gains (cascade)"
+            f"leaves {shown.words(fit.rms)}; {why} motion, which does not help against a dead band (a valve's "
+            "overlap), or give the loop's gains (cascade)"
         )
     if fit.structure.zeta:
         findings.append(
-            f"{part} does not tell how the loop is damped, which follows without a lag (velocity feed-forward): a "
+            f"{part} does not tell how the loop is damped, which follows without a lag (feed-forward, integrators): a "
             f"damping ratio of {fit.structure.zeta} is taken; give the loop's gains (cascade) if they are known"
         )
     gain = float(fit.structure.gains(fit.linear)[0].sum())

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
-from ..base.signals import Array, Indices, as_measured, as_samples
+from ..base.signals import Array, as_measured, as_samples
 from .structure import Structure, free_responses, responses, sections_of
 
 SAMPLES_MAX = 60_000  # samples that are used of long recordings: the parts in which the axis moves most
@@ -157,7 +157,7 @@ class _Problem:
         return np.concatenate((columns.T, target[None])).T, free.T
 
     def _responses_of(self, i: int, *theta: float) -> tuple[Array, Array]:
-        """Return the responses of one mode, or of the lag, to the command and to its initial states, ``(k, n)`` each."""
+        """Return the responses of one mode, or of the lag, to the command and to initial states, ``(k, n)``."""
         (u, _, rows), is_mode = self._data[i], len(theta) == 2
         one = Structure(int(is_mode), lag=not is_mode, zero=self._structure.zero)
         sections = sections_of(one, np.array(theta), self._T_s, self._input_hold)

@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 from ..base.signals import Array, Indices
 from ..model.physics import Mode
-from .output_error import Fit, Segment, fit_structure, motion_split, simulated
+from .output_error import Fit, Segment, fit_structure, motion_split, simulated, without
 from .search import fit_delay, shorter_delays
 from .structure import RATES_MIN, STRUCTURES, Structure
 from .uncertainty import estimates
@@ -83,8 +84,12 @@ _CANCELLING_WORTH, _HELD_OUT_WORTH = 0.6, 0.75
 fitted and held-out ones, and of the latter alone: a slow part that fits friction and cables leaves 0.64 to 0.85, one
 that is in the drive's loops less; friction that creeps looks so while it is fitted, and leaves 0.8 to 1 later."""
 
+_CREEPS = 5.0  # ratio of the rates at which friction may follow the command's sign
+
 _LIGHT, _DAMPED = 0.25, 0.5
 """Damping ratio below which a second order is hardly damped; that of a loop whose motion does not tell it."""
+
+_UNCERTAIN = "a parameter at the end of its range", "poles that the recording does not determine"
 
 _GROWTH = 2  # orders above the best one that are tried before the search ends
 _LAGS = 20  # lags at which the residual's correlation is looked at: nothing is left to model where it is white
@@ -108,6 +113,11 @@ class Candidate:
         """Frequencies of slow parts that its zeros all but cancel, Hz."""
         fit = self.fit
         return slow_parts(fit.structure.modes(fit.theta, fit.linear, 1.0)) if fit.structure.order > 1 else []
+
+    @property
+    def least_damping(self) -> float:
+        """Least damping ratio of its modes; infinite without any."""
+        return float(np.exp(self.fit.theta[1 : 2 * self.structure.n_modes : 2].min(initial=np.inf)))
 
     @property
     def rms_held_out(self) -> float:
@@ -187,6 +197,54 @@ def without_long_delay(chosen: Candidate, segments: Sequence[Segment], T_s: floa
         if (shorter := _in_place_of(chosen, fit, split, T_s)) is not None:
             return shorter
     return chosen
+
+
+def with_slow_part(
+    chosen: Candidate, candidates: Sequence[Candidate], segments: Sequence[Segment], T_s: float
+) -> Candidate:
+    """Return the simplest candidate that was refused for its poles though its slow part repeats, or the chosen one.
+
+    Motion may not tell the fast poles beside a slow part, which then are anywhere. It repeats where each part of the
+    log tells the other one. Friction that creeps does not, or what follows the command's sign as slowly explains it.
+    """
+    split = motion_split(segments, 1.0 - HELD_OUT)
+    better = [c for c in candidates if c.rms_held_out < _HELD_OUT_WORTH * chosen.rms_held_out]
+    left = [
+        c for c in better if c.objection in ("", *_UNCERTAIN) and c.least_damping >= _LIGHT
+    ]  # what rings is no part
+    earlier = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in split if s.known[: s.stop].sum() > 1]
+    later = [Segment(s.u[s.stop :], s.y[s.stop :], len(s.u) - s.stop) for s in split if s.known[s.stop :].sum() > 1]
+    later = [Segment(s.u - s.u[0], s.y - s.u[0], s.stop) for s in later]
+
+    def back(fit: Fit) -> float:  # its error, m, on the earlier part, fitted to the later one
+        again = fit_structure(later, T_s, fit.structure, fit.delay, [fit.theta], fit.slowest)
+        errors = [(s.y - simulated(again, s, T_s))[s.known][len(s.u) // SETTLING :] for s in earlier]
+        return float(np.std(np.concatenate(errors)))
+
+    most = _HELD_OUT_WORTH * back(chosen.fit) if left else 0.0
+    while left:
+        candidate = _chosen_of(left)
+        is_linear = _beside_friction(chosen.fit, candidate.fit, segments, T_s) < _CANCELLING_WORTH
+        if is_linear and back(candidate.fit) < most:
+            return replace(candidate, objection="")
+        left.remove(candidate)
+    return chosen
+
+
+def _beside_friction(fit: Fit, other: Fit, segments: Sequence[Segment], T_s: float) -> float:
+    """Return the ratio of the errors that friction leaves with and without what another fit has more than a fit.
+
+    Friction is the command's sign, and what follows it at rates from the other's slowest one on.
+    """
+    rates, errors = other.structure.slowest_rate(other.theta) * _CREEPS ** np.arange(4.0), []
+    for s in segments:
+        sign, x = np.sign(np.diff(s.u, prepend=s.u[0])), simulated(fit, s, T_s)
+        late = [lfilter([1.0 - kept], [1.0, -kept], sign) for kept in np.exp(-rates * T_s)]
+        friction, more = np.stack((np.ones(len(x)), sign, *late)).T[s.known], simulated(other, s, T_s) - x
+        both = without(friction, np.stack((s.y - x, more)).T[s.known])
+        errors.append((both[:, 0], without(both[:, 1:], both[:, :1])[:, 0]))
+    least, most = (float(np.sum(np.concatenate(one) ** 2)) for one in reversed(list(zip(*errors, strict=True))))
+    return float(np.sqrt(least / most))
 
 
 def well_damped(chosen: Candidate, segments: Sequence[Segment], T_s: float) -> Candidate:
@@ -269,7 +327,7 @@ def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:
     if structure.order <= 1:
         return ""
     if fit.at_bound:
-        return "a parameter at the end of its range"
+        return _UNCERTAIN[0]
     if structure.slowest_rate(fit.theta) < RATES_MIN / (T_s * max(segment.stop for segment in segments)):
         return "a pole slower than the recording shows"
     if structure.order > 2:
@@ -278,5 +336,5 @@ def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:
         poles = "f_n" if at_once else ("f_n", "tau")
         spreads = [e.std / e.value for e in estimates(fit, fitted, T_s)[0] if e.name.endswith(poles)]
         if max(spreads) > _SPREAD_MAX:
-            return "poles that the recording does not determine"
+            return _UNCERTAIN[1]
     return ""

@@ -185,12 +185,12 @@ def responses(structure: Structure, sections: Sequence[Section], u: Array) -> Ar
         positions.append(lfilter(numerators[0], denominator, u))
         if structure.zero and len(numerators) == 2:
             velocities.append(lfilter(numerators[1], denominator, u))
-    return np.stack(positions + velocities).T
+    return np.asarray(np.stack(positions + velocities).T)
 
 
 def free_responses(sections: Sequence[Section], n: int) -> Array:
     """Return the responses to initial states without a command, ``(n, order)``."""
-    columns, i = np.zeros((sum(len(section.b) for section in sections), n)).T, 0
+    columns, i = np.zeros((n, sum(len(section.b) for section in sections)), order="F"), 0
     for section in sections:
         slowest = float(np.abs(np.linalg.eigvals(section.A)).max())
         # Numbers that underflow take many times as long
