@@ -96,12 +96,12 @@ def held_for(x_d: Array) -> int:
 def straight_for(x_d: Array) -> int:
     """Return for how many samples each slope of a command is held, as by a coarse interpolator; 1 where it bends."""
     bends = np.abs(np.diff(x_d, 2))
-    at = np.flatnonzero(bends > max(_BENT * bends.max(initial=0.0), 2.0 * _rounding(x_d)))
+    at = np.flatnonzero(bends > max(_BENT * bends.max(initial=0.0), 2.0 * rounding_of(x_d)))
     n = int(np.quantile(np.diff(at), _HELD)) if len(at) > _STEPS else 1
     return n if np.bincount(at % n).max(initial=0) > _REGULAR * len(at) else 1
 
 
-def _rounding(x_d: Array) -> float:
+def rounding_of(x_d: Array) -> float:
     """Return the step to which commands are rounded, m.
 
     Rounding is white noise where they move, but not at every speed, and no more than their smallest change.
@@ -118,7 +118,7 @@ def _motion(x_d: Array, T_s: float) -> list[float]:
     """
     held = held_for(x_d)
     x_d, T_s = x_d[::held], held * T_s
-    rounding, found = _rounding(x_d), []
+    rounding, found = rounding_of(x_d), []
     for order in (1, 2, 3):
         sizes = {n: largest(np.diff(x_d[: len(x_d) // n * n].reshape(-1, n), order, axis=0)) for n in _OVER}
         n = next((n for n, size in sizes.items() if 2 ** (order - 1) * rounding <= _ROUNDING * size), 1)
@@ -394,7 +394,7 @@ def expected_tracking(
     return Tracking(
         *(none, physics, hybrid, inverse, bound, costs, *limits, len(without) * machine.T_s),
         *(error, reached, max(map(held_for, commands), default=1), max(map(straight_for, commands), default=1)),
-        *(max(map(_rounding, commands), default=0.0), machine.T_s, ahead),
+        *(max(map(rounding_of, commands), default=0.0), machine.T_s, ahead),
     )
 
 

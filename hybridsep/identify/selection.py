@@ -115,11 +115,6 @@ class Candidate:
         return slow_parts(fit.structure.modes(fit.theta, fit.linear, 1.0)) if fit.structure.order > 1 else []
 
     @property
-    def least_damping(self) -> float:
-        """Least damping ratio of its modes; infinite without any."""
-        return float(np.exp(self.fit.theta[1 : 2 * self.structure.n_modes : 2].min(initial=np.inf)))
-
-    @property
     def rms_held_out(self) -> float:
         """Root mean square of the held-out error, m."""
         return float(np.sqrt(np.mean(self.held_out**2)))
@@ -209,9 +204,7 @@ def with_slow_part(
     """
     split = motion_split(segments, 1.0 - HELD_OUT)
     better = [c for c in candidates if c.rms_held_out < _HELD_OUT_WORTH * chosen.rms_held_out]
-    left = [
-        c for c in better if c.objection in ("", *_UNCERTAIN) and c.least_damping >= _LIGHT
-    ]  # what rings is no part
+    left = [c for c in better if c.objection in ("", *_UNCERTAIN) and c.slow_parts]
     earlier = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in split if s.known[: s.stop].sum() > 1]
     later = [Segment(s.u[s.stop :], s.y[s.stop :], len(s.u) - s.stop) for s in split if s.known[s.stop :].sum() > 1]
     later = [Segment(s.u - s.u[0], s.y - s.u[0], s.stop) for s in later]

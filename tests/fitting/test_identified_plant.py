@@ -9,7 +9,7 @@ from hybridsep import Limits, ModalModel, Mode, rest_to_rest, simulate
 from hybridsep.base.metrics import peak_derivatives
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.fitting.compensation import estimated_limits, held_for, largest_motion
+from hybridsep.fitting.compensation import estimated_limits, held_for, largest_motion, rounding_of, straight_for
 from hybridsep.fitting.plant import commands_to_try, identified_plant
 from hybridsep.fitting.replay import Recording
 from hybridsep.logs.units import shown_in
@@ -132,3 +132,13 @@ def test_limits_are_estimated_from_the_motion() -> None:
     assert found["change_max"] == pytest.approx(2 * np.abs(recording.x_d - recording.x).max(), rel=1e-3)
     assert found["estimated"] is True
     assert estimated_limits([replace(recording, x_d=np.zeros(9), x=np.zeros(9))], T_S) == {}
+
+
+@pytest.mark.parametrize("rounding", [0.0, 1e-7])
+def test_an_interpolator_and_rounding_are_seen(rounding: float) -> None:
+    k = np.arange(12_000)
+    smooth = 0.03 * np.sin(k / 400.0) * np.cos(k / 2900.0)
+    straight = np.interp(k, k[::3], smooth[::3])
+    told = [np.round(x / rounding) * rounding if rounding else x for x in (smooth, straight)]
+    assert [straight_for(x) for x in told] == [1, 3]
+    assert rounding_of(told[0]) == pytest.approx(rounding, rel=0.2, abs=1e-10)

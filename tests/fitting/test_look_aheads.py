@@ -23,8 +23,8 @@ SERVO = ModalModel([Mode(6.0, 0.8, (12 * np.pi) ** 2)])  # it lags by 42 ms
 MOVES = rest_to_rest([0.0, 0.01, -0.008], Limits(0.1, 1.0, 50.0), T_S, start_times=[0.3, 0.7], duration=1.2)
 
 
-def axis(model: ModalModel, preview: int) -> Machine:
-    limits = {"velocity": 0.3, "acceleration": 3.0, "jerk": 500.0, "change_max": 0.02}
+def axis(model: ModalModel, preview: int, **changed: float) -> Machine:
+    limits = {"velocity": 0.3, "acceleration": 3.0, "jerk": 500.0, "change_max": 0.02, **changed}
     return machine_of(
         *(model, "zoh", T_S, "axis", "Axis"),
         unit="m",
@@ -77,6 +77,17 @@ def test_a_look_ahead_that_is_too_short_is_said_with_the_gain_of_a_longer_one(fo
     assert f"plans leave {here.left / found.off:.2g} × the error without compensation" in line
     assert f"{there.left / found.off:.2g} ×. If the controller has it: --look-ahead {there.preview}ms." in line
     assert replace(found, chosen=there.preview).lines() == []
+
+
+def test_settings_that_bind_are_told_of_commands_of_a_few_samples() -> None:
+    """A galvanometer of 1.5 kHz at 20 kHz: no limit binds, and what is left is the plans' own, the more the longer."""
+    T_s, model = T_S / 20, ModalModel([Mode(1500.0, 0.7, (3000 * np.pi) ** 2)])
+    moves = rest_to_rest([0.0, 1e-4, -1e-4], Limits(0.5, 5e3, 2e8), T_s, start_times=[0.005, 0.0075], duration=0.02)
+    machine = replace(axis(model, 200, velocity=10.0, acceleration=1e6, jerk=1e9), T_s=T_s)
+    discrete = model.discretise(T_s)
+    found = looked(machine, Recording(moves, discrete.forced_response(discrete.rest(), moves)[0], 100))
+    rows = {row[0]: row[3] for row in found.figures(shown_in("m"))[2]}
+    assert rows["10, chosen"] == "jerk_weight"
 
 
 @pytest.mark.parametrize(
