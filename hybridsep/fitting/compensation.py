@@ -514,8 +514,7 @@ def _inverted(machine: Machine, recordings: Sequence[Recording]) -> ErrorSize:
     """Return the errors to be expected of the rival over the test samples, on the same drive."""
     settings = machine.compensator_predictor
     late, Np = settings.n_late, settings.Np
-    reach = max(Np, machine.look_ahead)  # a slow drive remembers more than a window
-    rival = FirInverse.fitted([in_time(*one.training, late) for one in recordings], reach)
+    rival = FirInverse.fitted([in_time(*one.training, late) for one in recordings], Np)
     discrete, errors = machine.model.discretise(settings.T_s, settings.input_hold), []
     for one in recordings if rival else ():
         x_d, x = in_time(one.x_d, one.x, late)
