@@ -29,7 +29,6 @@ library."""
 
 _ROUNDING = 0.1  # most that rounding may have of the largest difference of commands, from which motion is estimated
 _OVER = tuple(sorted({round(1.25**i) for i in range(40)}))  # samples that such a difference may be over
-_BENT, _REGULAR = 1e-3, 0.9  # bend of a command, in its largest, that counts; share of bends at every n-th sample
 _HELD, _STEPS = 0.1, 100  # quantile of the intervals between changes for which a command is held; fewer are steps
 
 _ZERO, _VARIES = 10.0, 0.999
@@ -91,14 +90,6 @@ def held_for(x_d: Array) -> int:
     """Return for how many samples each command is held, or rounded to the same."""
     intervals = np.diff(np.flatnonzero(np.diff(x_d)))
     return int(np.quantile(intervals, _HELD)) if len(intervals) > _STEPS else 1
-
-
-def straight_for(x_d: Array) -> int:
-    """Return for how many samples each slope of a command is held, as by a coarse interpolator; 1 where it bends."""
-    bends = np.abs(np.diff(x_d, 2))
-    at = np.flatnonzero(bends > max(_BENT * bends.max(initial=0.0), 2.0 * rounding_of(x_d)))
-    n = int(np.quantile(np.diff(at), _HELD)) if len(at) > _STEPS else 1
-    return n if np.bincount(at % n).max(initial=0) > _REGULAR * len(at) else 1
 
 
 def rounding_of(x_d: Array) -> float:
@@ -283,7 +274,6 @@ class Tracking:
     largest: float  # servo error of the whole logs, m
     motion: Mapping[str, Sequence[float]]  # name of a limit → largest of the logs' commands, and the drive's, SI
     held: int  # samples for which each command is the same
-    straight: int  # and for which its slope is
     rounding: float  # step of the commands, m
     T_s: float
     look_aheads: LookAheads | None  # None where the model has no error to compensate
@@ -321,11 +311,6 @@ class Tracking:
             lines.append(
                 f"The log's commands are held, or rounded to the same, for {self.held} samples each; where their steps "
                 "exceed a limit, that bounds what the compensator adds."
-            )
-        elif self.straight > 1:
-            lines.append(
-                f"The log's commands run straight for {self.straight} samples each, as of an interpolator that is as "
-                "much slower: their bends count as jerk, and bound what the compensator adds where a limit binds."
             )
         _, most = self.motion.get("j_max", (0.0, math.inf))
         if self.held == 1 and 4.0 * self.rounding > most * self.T_s**3:
@@ -393,8 +378,8 @@ def expected_tracking(
     reached = {name: (size, most) for size, (name, most) in zip(motion.tolist(), drive.items(), strict=False)}
     return Tracking(
         *(none, physics, hybrid, inverse, bound, costs, *limits, len(without) * machine.T_s),
-        *(error, reached, max(map(held_for, commands), default=1), max(map(straight_for, commands), default=1)),
-        *(max(map(rounding_of, commands), default=0.0), machine.T_s, ahead),
+        *(error, reached, max(map(held_for, commands), default=1), max(map(rounding_of, commands), default=0.0)),
+        *(machine.T_s, ahead),
     )
 
 
