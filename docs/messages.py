@@ -120,8 +120,8 @@ FINDINGS: Mapping[str, Explanation] = {
         "None is needed with `averaging = true`: they are left out. Without averaging such a log is refused.",
     ),
     "moved at rest": Explanation(
-        "The axis moves while its command has rested for 0.3 s, further than its error ever was in motion: something "
-        "else moves it, as where a tool or a reel is changed.",
+        "The axis moves while its command has rested for 0.3 s, further than its error ever was in motion, and than "
+        "its noise at rest: something else moves it, as where a tool or a reel is changed.",
         "None is needed: these samples count as missing, as a compensator would learn them as the command's.",
     ),
     "rate": Explanation(

@@ -373,7 +373,8 @@ def expected_tracking(
     without = max((one.without for one in judged.values()), key=len)
     none, physics, hybrid = map(ErrorSize.of, (without, *(one.compensated for one in judged.values())))
     inverse, limits = _inverted(machine, first), (allowed.change_max, allowed.following_error_max)
-    (motion, error), commands = largest_motion(recordings, machine.T_s), [one.x_d for one in recordings]
+    motion, error = largest_motion(recordings, machine.T_s)
+    commands = [one.x_d for one in recordings if np.count_nonzero(np.diff(one.x_d)) > _STEPS]  # fewer are steps
     drive = {} if allowed.limits is None else allowed.limits.to_fmi()
     reached = {name: (size, most) for size, (name, most) in zip(motion.tolist(), drive.items(), strict=False)}
     return Tracking(

@@ -57,9 +57,10 @@ _HELD, _REPEATED = 0.1, 0.2
 """Way of the command, relative to its travel, while the measured position is held; and share of the samples in fast
 motion that repeat the one before, from which they are noted."""
 
-_RESTED, _STOOD, _BACK = 0.3, 0.1, 0.1
+_RESTED, _STOOD, _NOISE, _BACK = 0.3, 0.1, 8.0, 0.1
 """Rest of a command, s, behind which something else moves an axis if it leaves where it stood for so many seconds by
-more than its error was ever beside the median in motion; and share of that within which it is back."""
+more than its error was ever beside the median in motion, and than so many standard deviations of its noise at rest; and
+share of that within which it is back."""
 
 
 @dataclass(frozen=True)
@@ -318,9 +319,8 @@ def starts_in_motion(x_d: Array) -> bool:
 
 def noise_std(x: Array) -> float:
     """Return the standard deviation of white noise on a smooth signal, from the median of its fifth differences."""
-    if len(x) < 12:
-        return 0.0
-    return float(np.median(np.abs(np.diff(x, 5)))) / (0.6745 * math.sqrt(252.0))
+    rough = np.abs(np.diff(x, 5)) if len(x) >= 12 else np.zeros(1)
+    return float(np.median(rough)) / (0.6745 * math.sqrt(252.0))
 
 
 def resolution(x: Array) -> float:
@@ -331,15 +331,12 @@ def resolution(x: Array) -> float:
 
 def _note_start(log: Log) -> Iterator[Finding]:
     if starts_in_motion(log.x_d):
-        steps = np.abs(np.diff(log.x_d))
-        factor, unit = log.shown.position
+        speeds, (factor, unit) = np.abs(np.diff(log.x_d)) / log.T_s, log.shown.position
         words = (
-            f"the log begins in motion, at {factor * steps[0] / log.T_s:.3g} {unit}/s of "
-            f"{factor * steps.max() / log.T_s:.3g} at most; the state in which the axis begins is estimated from its "
-            "first samples"
+            f"the log begins in motion, at {factor * speeds[0]:.3g} {unit}/s of {factor * speeds.max():.3g} at most; "
+            "the state in which the axis begins is estimated from its first samples"
         )
-        evidence = {"velocity": float(steps[0]) / log.T_s, "largest": float(steps.max()) / log.T_s}
-        yield Finding("start in motion", words, evidence)
+        yield Finding("start in motion", words, {"velocity": float(speeds[0]), "largest": float(speeds.max())})
 
 
 def _note_missing(log: Log) -> Iterator[Finding]:
@@ -355,11 +352,14 @@ def _note_missing(log: Log) -> Iterator[Finding]:
 def commanded(log: Log) -> Array:
     """Return a segment's measured positions, ``(n,)``, NaN where something else moves the axis at a command's rest."""
     at, error, x = np.arange(len(log.t)), log.x_meas - log.x_d, np.array(log.x_meas)
-    rests = at - np.maximum.accumulate(np.where(np.diff(log.x_d, prepend=log.x_d[0]), at, 0)) > _RESTED / log.T_s
-    edges, known = np.flatnonzero(np.diff(rests, prepend=False, append=False)), ~rests & np.isfinite(error)
-    most = np.max(np.abs(error[known] - np.median(error[known]))) if known.any() else np.inf
+    moves, known = np.diff(log.x_d, prepend=log.x_d[:1]) != 0.0, np.isfinite(error)
+    rests = at - np.maximum.accumulate(np.where(moves, at, 0)) > _RESTED / log.T_s
+    edges, moving = np.flatnonzero(np.diff(rests, prepend=False, append=False)), error[known & ~rests & moves.any()]
+    noise = _NOISE * noise_std(error[known & rests])
+    most = max(np.max(np.abs(moving - np.median(moving))), noise) if len(moving) else np.inf
     for first, end in edges.reshape(-1, 2).tolist():
-        away = np.abs(error[first:end] - np.median(error[first:end][: max(1, round(_STOOD / log.T_s))]))
+        stood = error[first:end][known[first:end]][: max(1, round(_STOOD / log.T_s))]
+        away = np.abs(error[first:end] - (np.median(stood) if len(stood) else np.nan))
         far, near = np.flatnonzero(away > most), np.flatnonzero(away <= _BACK * most)
         if len(far) and len(near) and near[0] < far[0]:
             begins, back = near[near < far[0]][-1], near[near > far[-1]]
@@ -462,16 +462,13 @@ def _note_held(log: Log, lag: int) -> Iterator[Finding]:
     longest = int(np.argmax(moved))
     if moved[longest] > _HELD:
         first, last = int(edges[longest]), int(edges[longest + 1])
-        at_end = bool(x[first] in (np.nanmin(x), np.nanmax(x)))
-        name = "clipped" if at_end else "stuck samples"
+        at_end = "clipped", "at its end, where the recorder's range ends, or the axis stands by friction or load"
+        between = "stuck samples", "the sensor was held, or the axis sticks"
+        name, why = at_end if x[first] in (np.nanmin(x), np.nanmax(x)) else between
         n = int((moved > _HELD).sum())
         words = (
             f"the measured position stands {n} time{'s' if n > 1 else ''} while the command goes on, longest from "
-            f"sample {first + 1} for {last - first} samples, {moved[longest]:.2g} of the travel: "
-        ) + (
-            "at its end, where the recorder's range ends, or the axis stands by friction or load"
-            if at_end
-            else "the sensor was held, or the axis sticks"
+            f"sample {first + 1} for {last - first} samples, {moved[longest]:.2g} of the travel: {why}"
         )
         evidence = {"n": float(n), "n_samples": float(last - first), "moved": float(moved[longest])}
         yield Finding(name, words, evidence)

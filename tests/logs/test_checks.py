@@ -367,6 +367,16 @@ def test_what_moves_an_axis_at_rest_is_not_learned() -> None:
     assert note.evidence == {"n": 1.0, "duration": pytest.approx(1e-3 * len(gone))}
     away = replace(log, x_meas=np.concatenate((log.x_meas[:3800], np.full(700, log.x_meas[3800]))))  # not back
     assert np.isnan(commanded(away)[3700:]).all()
+    log.x_meas[3301] = np.nan  # among the samples that tell where it stood
+    assert np.isnan(commanded(log)).sum() == len(gone) + 1
+
+
+def test_noise_moves_no_axis() -> None:
+    """Of an axis whose error is its noise, with a longer rest than motion; and of a segment that only rests."""
+    x_d = np.concatenate((sines().x_d, np.full(60_000, sines().x_d[-1])))
+    log = log_of(x_d, x_d + np.random.default_rng(4).normal(0.0, 1e-6, len(x_d)))
+    for one in (log, *replace(log, starts=(0, 3100)).segments()):
+        assert not np.isnan(commanded(one)).any()
 
 
 @pytest.mark.parametrize("rest", [0.1, 0.8])
