@@ -100,7 +100,8 @@ def fit(
     with progress_bar(as_json) as advance:
         given: dict[str, Any] = {"Np": Np, "p": lags, "look_ahead": ahead, "cascade": gains, "name": machine, **known}
         result = fit_logs(used, progress=lambda words, done: advance(words, 0.87 * done), **given)
-        said = {name: getattr(reading, name) for name in ("t", "x_d", "x", "unit", "axis") if getattr(reading, name)}
+        names = ("t", "x_d", "x", "axis", *(["unit"] if reading.x_d else []))  # runs that cosim saves are in SI
+        said = {name: getattr(reading, name) for name in names if getattr(reading, name)}
         result = replace(result, machine=result.machine.changed("log", said))  # for the commands that follow
         result.build(folder, in_position=in_position, progress=lambda words, done: advance(words, 0.87 + 0.13 * done))
     if as_json:

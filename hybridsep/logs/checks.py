@@ -184,7 +184,7 @@ def _unit(log: Log) -> Iterator[Finding]:
         return
     words = (
         f"read in {log.file_unit or 'm'}, {travel:.4g} m of travel and {usual:.4g} m/s² of acceleration are more than "
-        "a feed axis has: are the positions in mm, µm or, of a rotary axis, deg?"
+        "a feed axis has: are the positions in a smaller unit or, of a rotary axis, in deg?"
     )
     evidence, stated = {"travel": travel, "acceleration": usual}, log.unit_stated
     yield Finding("unit", words, evidence, refused=not stated, options=() if stated else UNIT_OPTIONS)

@@ -209,8 +209,9 @@ def test_a_gap_separates_segments(hybridsep: Run, tmp_path: Path) -> None:
     log = write_rows(tmp_path / "axis.csv", commanded()[:1200], measured(0)[:1200])
     lines = log.read_text().splitlines(keepends=True)
     log.write_text("".join(lines[:400] + lines[800:]))
-    status, out, err = hybridsep("fit", log, "--out", tmp_path / "fit", "--Np", 40)
+    status, out, err = hybridsep("fit", log, "--unit", "m", "--out", tmp_path / "fit", "--Np", 40)
     assert status == 0, err
+    assert load_machine(tmp_path / "fit" / "machine.toml").log.unit is None  # runs of that machine have these columns
     assert "note: axis.csv: 400 samples are missing in 1 gap" in err
     words = " ".join(out.split())
     assert "axis.csv: 800 samples, 0.8 s at 1000 Hz in 2 segments of a record of 1.2 s, travel" in words
