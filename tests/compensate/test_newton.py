@@ -225,6 +225,14 @@ def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.Mo
         np.testing.assert_array_equal(plan.x_dm, expected.plan(x_d).x_dm)
 
 
+def test_where_no_length_of_a_step_is_better_the_next_one_looks_farther(monkeypatch: pytest.MonkeyPatch) -> None:
+    sep = SepCompensator.from_bytes(learned())
+    assert sep._planning.reach < 0.5
+    monkeypatch.setattr(newton, "is_better", lambda *_: False)
+    run(sep)
+    assert sep._planning.reach >= 1.0
+
+
 def no_faster(velocity: float) -> Callable[[int, float], float]:
     """Return the sensor of a drive whose motor does not go beyond a velocity, m/s."""
     last = 0.0
