@@ -59,8 +59,7 @@ motion that repeat the one before, from which they are noted."""
 
 _RESTED, _STOOD, _NOISE, _BACK = 0.3, 0.1, 8.0, 0.1
 """Rest of a command, s, behind which something else moves an axis if it leaves where it stood for so many seconds by
-more than its error was ever beside the median in motion, and than so many standard deviations of its noise at rest; and
-share of that within which it is back."""
+more than its largest error in motion and so many deviations of its noise; and share of that within which it is back."""
 
 
 @dataclass(frozen=True)
@@ -355,10 +354,12 @@ def commanded(log: Log) -> Array:
     moves, known = np.diff(log.x_d, prepend=log.x_d[:1]) != 0.0, np.isfinite(error)
     rests = at - np.maximum.accumulate(np.where(moves, at, 0)) > _RESTED / log.T_s
     edges, moving = np.flatnonzero(np.diff(rests, prepend=False, append=False)), error[known & ~rests & moves.any()]
-    noise = _NOISE * noise_std(error[known & rests])
-    most = max(np.max(np.abs(moving - np.median(moving))), noise) if len(moving) else np.inf
+    if not len(moving):
+        return x
+    most = max(np.max(np.abs(moving - np.median(moving))), _NOISE * noise_std(error[known & rests]))
+    error[_spikes(error, 0.0)[0]] = np.nan  # an outlier is no motion
     for first, end in edges.reshape(-1, 2).tolist():
-        stood = error[first:end][known[first:end]][: max(1, round(_STOOD / log.T_s))]
+        stood = error[first:end][np.isfinite(error[first:end])][: max(1, round(_STOOD / log.T_s))]
         away = np.abs(error[first:end] - (np.median(stood) if len(stood) else np.nan))
         far, near = np.flatnonzero(away > most), np.flatnonzero(away <= _BACK * most)
         if len(far) and len(near) and near[0] < far[0]:
@@ -373,7 +374,7 @@ def _note_moved_at_rest(log: Log) -> Iterator[Finding]:
         n, duration = int((np.diff(moved, prepend=False) & moved).sum()), float(moved.sum()) * log.T_s
         words = (
             f"something else moves the axis while its command rests, {n} time{'s' if n > 1 else ''}, the first at "
-            f"{log.t[np.argmax(moved)]:.4g} s, {duration:.3g} s in all: these samples are neither learned nor judged"
+            f"{log.t[np.argmax(moved)]:.4g} s, {duration:.3g} s in all: fit neither learns nor judges these samples"
         )
         yield Finding("moved at rest", words, {"n": float(n), "duration": duration})
 
