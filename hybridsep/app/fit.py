@@ -4,7 +4,6 @@ import math
 import shlex
 import sys
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -100,9 +99,6 @@ def fit(
     with progress_bar(as_json) as advance:
         given: dict[str, Any] = {"Np": Np, "p": lags, "look_ahead": ahead, "cascade": gains, "name": machine, **known}
         result = fit_logs(used, progress=lambda words, done: advance(words, 0.87 * done), **given)
-        names = ("t", "x_d", "x", "axis", *(["unit"] if reading.x_d else []))  # runs that cosim saves are in SI
-        said = {name: getattr(reading, name) for name in names if getattr(reading, name)}
-        result = replace(result, machine=result.machine.changed("log", said))  # for the commands that follow
         result.build(folder, in_position=in_position, progress=lambda words, done: advance(words, 0.87 + 0.13 * done))
     if as_json:
         listed = {log_name: findings_table(one) for log_name, one in result.findings.items()}

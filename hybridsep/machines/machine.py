@@ -115,7 +115,7 @@ class Machine(FileSection):
         return self._compensation().for_window(self.compensator_predictor.Np, self.look_ahead)
 
     def changed(
-        self, section: Literal["", "predictor", "compensator", "plant", "log"], values: Mapping[str, Any]
+        self, section: Literal["", "predictor", "compensator", "plant"], values: Mapping[str, Any]
     ) -> "Machine":
         """Return a copy with other entries of a section, by their names in the file; ``""``: of the file itself.
 
