@@ -205,6 +205,15 @@ def test_a_slow_part_beside_a_fast_loop_is_found(f_n: float, gain: float) -> Non
 
 
 @pytest.mark.slow
+def test_a_flexible_mode_beside_a_velocity_loop_with_integrator_is_found() -> None:
+    """Three poles of the loop and two of the mode."""
+    truth = ModalModel([mode(21.0, 0.03, 0.1), mode(23.0, 1.5, 1.9), lag_mode(0.06, -1.0)], dead_time=1)
+    x_d = moves(6000)
+    found = identify_operation([(x_d, measured(truth, rubbed(x_d, 5e-6), "foh", 5e-7))], T_S)
+    assert found.structure.startswith("2 modes and lag")
+
+
+@pytest.mark.slow
 def test_a_slow_part_is_taken_where_it_repeats_though_its_fast_pole_is_not_known() -> None:
     """A harmonic drive whose motor follows within a sample: its poles were refused, and a lag left seven tenths."""
     x_d, truth = moves(8000), ModalModel([lag_mode(1.6e-4, 0.94), lag_mode(1.0 / (3.4 * np.pi), 0.06)])

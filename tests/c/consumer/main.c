@@ -16,7 +16,7 @@ int main(void)
     parameters.predictor.p = 5;
     parameters.n_modes = 1;
     parameters.modes = &mode;
-    hsep_predictor *predictor = malloc(hsep_predictor_size(&parameters));
+    hsep_predictor *predictor = (hsep_predictor *)malloc(hsep_predictor_size(&parameters)); /* cast for C++ */
     if (predictor == NULL || hsep_predictor_init(predictor, &parameters, 0.0, NULL, 0) != HSEP_BEGAN) {
         return 1;
     }
