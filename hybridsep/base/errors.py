@@ -67,7 +67,9 @@ class LogError(HybridSepError, ValueError):
     The command line prints itself with the ``options`` that would put it right, one of them, each with what it means.
     """
 
-    options: tuple[tuple[str, str], ...] = ()
+    def __init__(self, message: str, options: Collection[tuple[str, str]] = ()) -> None:
+        super().__init__(message)
+        self.options = tuple(options)
 
 
 class MachineError(HybridSepError, ValueError):

@@ -4,7 +4,7 @@ The errors of a run are summed up by place: a third of the look-ahead window, an
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,6 @@ _UNSTABLE = 3.0  # largest change of the prediction, relative to the largest res
 
 _N_EARLY = 10  # windows that count as the beginning of a run
 
-_N_THIRDS = 3
 _THIRDS = ("first third", "second third", "last third")
 _MOTIONS = ("standstill", "motion")
 _PEERS = ("the physics model", "hold")  # peers of every hybrid model, whose errors also tell why it is worse
@@ -88,46 +87,35 @@ def judge(
     not learned, and of these missing ones; as many as the samples lack, if left out.
     """
     begin, known = np.flatnonzero(place == 0), ~np.isnan(x)
-    window = np.cumsum(place == 0) - 1
+    window, n_known = np.cumsum(place == 0) - 1, int(known.sum())
     speed = np.abs(np.diff(x_d, prepend=x_d[:1]))
     fastest = np.maximum.accumulate(np.maximum.reduceat(speed, begin))[window] if len(x) else speed
-    moving = speed > STANDSTILL * fastest
+    moving, third = speed > STANDSTILL * fastest, place * len(_THIRDS) // Np
+    there = dict(zip((*_MOTIONS, *_THIRDS), (~moving, moving, *(third == i for i in range(len(_THIRDS)))), strict=True))
     squares = np.where(known, (x - predictions) ** 2, 0.0)
-    cell = _N_THIRDS * moving + np.minimum(place * _N_THIRDS // Np, _N_THIRDS - 1)
-    shape = (len(_MOTIONS), _N_THIRDS)
-    sums = np.array([np.bincount(cell, row, math.prod(shape)) for row in (*squares, 1.0 * known)], np.float64)
-    *peers, h, counts = sums.reshape(-1, *shape)
-    total = float(counts.sum())
-    ratios = tuple(math.nan if peer.sum() < least**2 * total else _ratio(h.sum(), peer.sum()) for peer in peers)
+    enough = max(_LEAST_SHARE * n_known, 1.0)
+    sums = {name: squares[:, one].sum(axis=1) for name, one in there.items() if (one & known).sum() >= enough}
+    *peers, h = squares.sum(axis=1).tolist()
     whole = (np.bincount(window) == Np) & (np.bincount(window, known) > 0)
-    places = _places(counts)
-    lost = int((~known).sum())
+    lost = len(x) - n_known
+    ratios = tuple(math.nan if peer < least**2 * n_known else _ratio(h, peer) for peer in peers)
+    worse = (
+        tuple(name for name, one in sums.items() if _ratio(one[-1], one[i]) > 1.0 + ALIKE) for i in range(len(peers))
+    )
     later = squares[:, window >= _N_EARLY].sum(axis=1) if len(begin) > 2 * _N_EARLY else None
     change = float(np.abs(predictions[-1] - predictions[0]).max(initial=0.0))
     largest = math.sqrt(squares[0].max(initial=0.0))
     return Verdict(
         (*_PEERS, *further),
         ratios,
-        tuple(_worse(h, peer, places) for peer in peers),
-        tuple(places),
+        tuple(worse),
+        tuple(sums),
         _cause(ratios[: len(_PEERS)], change, largest, later),
         n_rejected,
         min(lost if n_missing is None else n_missing, n_rejected),
-        int(total) + lost,
+        len(x),
         int(whole.sum()),
     )
-
-
-def _places(counts: Array) -> dict[str, tuple[int, int]]:
-    """Return the places with enough samples: name → axis of the sums, and place there."""
-    places = {name: (0, i) for i, name in enumerate(_MOTIONS)} | {name: (1, i) for i, name in enumerate(_THIRDS)}
-    least = max(_LEAST_SHARE * counts.sum(), 1.0)
-    return {name: (axis, i) for name, (axis, i) in places.items() if counts.take(i, axis=axis).sum() >= least}
-
-
-def _worse(h: Array, peer: Array, places: Mapping[str, tuple[int, int]]) -> tuple[str, ...]:
-    sums = {name: (h.take(i, axis=axis).sum(), peer.take(i, axis=axis).sum()) for name, (axis, i) in places.items()}
-    return tuple(name for name, pair in sums.items() if _ratio(*pair) > 1.0 + ALIKE)
 
 
 def _cause(ratios: Sequence[float], change: float, largest: float, later: Array | None) -> str:
@@ -171,7 +159,7 @@ def _listed(places: tuple[str, ...]) -> str:
     """Return places as text: "at standstill and in the first third of the window"."""
     shown = [text for place, text in zip(_MOTIONS, ("at standstill", "in motion"), strict=True) if place in places]
     thirds = [place.partition(" ")[0] for place in places if place in _THIRDS]
-    if len(thirds) == _N_THIRDS:
+    if len(thirds) == len(_THIRDS):
         return f"{' and '.join(shown)}{', ' if shown else ''}in every third of the window"
     if thirds:
         shown.append(f"in the {' and '.join(thirds)} third of the window")

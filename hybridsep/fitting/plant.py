@@ -100,10 +100,14 @@ class _Piece:
         self.choosing = known & (n >= _FITTED * n_train) & (n < n_train)
         self.judging = known & (n >= recording.judges_from)
 
-    def error(self, discrete: DiscreteModel, plant: _Disturbed) -> Array:
-        """Return what was measured less the plant's position, ``(n,)``, m, with an offset that is the sensor's."""
-        disturbance = plant.f * np.tanh(self.v_d / plant.v_friction) + plant.kappa * self.path * np.abs(self.path)
-        return np.asarray(self.x - discrete.forced_response(discrete.rest(), self.u - disturbance)[0])
+
+def _errors(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece]) -> list[Array]:
+    """Return what was measured of each piece less the plant's position, ``(n,)``, m, with the sensor's offset."""
+    discrete, found = plant.model.discretise(settings.T_s, settings.input_hold), []
+    for one in pieces:
+        disturbance = plant.f * np.tanh(one.v_d / plant.v_friction) + plant.kappa * one.path * np.abs(one.path)
+        found.append(np.asarray(one.x - discrete.forced_response(discrete.rest(), one.u - disturbance)[0]))
+    return found
 
 
 def identified_plant(
@@ -180,23 +184,20 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
         moved = ModalModel(modes, alone.model.dead_time)
         return _Disturbed(moved, scale * f, with_stiffness * scale * kappa / reach**2, fastest * math.exp(spread))
 
-    found = []
+    def residual(theta: Array, with_stiffness: bool) -> Array:
+        errors = _errors(settings, plant(theta, with_stiffness), fitted)
+        known = [error[piece.fitted] for piece, error in zip(fitted, errors, strict=True)]
+        return np.concatenate([(error - error.mean()) / scale for error in known])
+
+    reach_of_modes, found = np.tile(_MODE_REACH, n // 4), []
+    bound = np.append(reach_of_modes, [1e3, 1e3, 0.0])
+    least = np.append(-reach_of_modes, [0.0, 0.0, math.log(_SMALLEST_SPREAD)])
+    steps = np.append(np.tile(_MODE_STEPS, n // 4), np.ones(3))
+    how: dict[str, Any] = {"bounds": (least, bound), "x_scale": steps, "max_nfev": _EVALUATIONS}
     for with_stiffness in (False, True):
-
-        def residual(theta: Array, with_stiffness: bool = with_stiffness) -> Array:
-            one = plant(theta, with_stiffness)
-            discrete = one.model.discretise(settings.T_s, settings.input_hold)
-            errors = [piece.error(discrete, one)[piece.fitted] for piece in fitted]
-            return np.concatenate([(error - error.mean()) / scale for error in errors])
-
-        modes = len(alone.model.modes)
-        start = np.concatenate((np.zeros(n), [0.5, 0.5 if with_stiffness else 1e-9, math.log(0.02)]))
-        bound = np.concatenate((np.tile(_MODE_REACH, modes), [1e3, 1e3, 0.0]))
-        least = np.concatenate((-np.tile(_MODE_REACH, modes), [0.0, 0.0, math.log(_SMALLEST_SPREAD)]))
-        steps = np.concatenate((np.tile(_MODE_STEPS, modes), np.ones(3)))
+        start = np.append(np.zeros(n), [0.5, 0.5 if with_stiffness else 1e-9, math.log(0.02)])
         try:
-            done = least_squares(residual, start, bounds=(least, bound), x_scale=steps, max_nfev=_EVALUATIONS)
-            one = plant(done.x, with_stiffness)
+            one = plant(least_squares(residual, start, args=(with_stiffness,), **how).x, with_stiffness)
             StageDrive(one.model, one.f, one.kappa, settings.T_s, v_friction=one.v_friction)
         except (ParameterError, ValueError):  # a mode out of range, or an error that overflowed
             continue
@@ -206,22 +207,18 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
 
 def _rms_of(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece], part: str) -> float:
     """Return the RMS error of a plant over a part of all pieces, m, less the mean error of what was fitted to."""
-    discrete = plant.model.discretise(settings.T_s, settings.input_hold)
     parts = []
-    for piece in pieces:
-        error = piece.error(discrete, plant)
-        of_offset = piece.fitted if piece.fitted.any() else getattr(piece, part)
-        if getattr(piece, part).any():
-            parts.append(error[getattr(piece, part)] - error[of_offset].mean())
+    for piece, error in zip(pieces, _errors(settings, plant, pieces), strict=True):
+        if (wanted := getattr(piece, part)).any():
+            parts.append(error[wanted] - error[piece.fitted if piece.fitted.any() else wanted].mean())
     return rms(np.concatenate(parts)) if parts else math.nan
 
 
 def _noise(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece]) -> float:
     """Return the standard deviation of the measurement noise, m, at least the resolution's."""
-    discrete = plant.model.discretise(settings.T_s, settings.input_hold)
     found = []
-    for piece in pieces:
+    for piece, error in zip(pieces, _errors(settings, plant, pieces), strict=True):
         known = ~np.isnan(piece.x)
-        x, e = piece.x[known], piece.error(discrete, plant)[known]
+        x, e = piece.x[known], error[known]
         found.append(max(min(noise_std(x), noise_std(e)), resolution(x) / math.sqrt(12.0)))
     return min(float(np.median(found)), float(PARAMETERS["noise_std"].maximum or 1.0)) if found else 0.0

@@ -16,19 +16,9 @@ from collections.abc import Sequence
 from ..base.files import data_folder
 from ..base.version import __version__
 from ..plants.trajectory import spiral, staircase
+from . import description
 from .c_header import FMI_HEADERS, TABLE_FILE, c_header, c_sources, fmi_headers, table_file
 from .compile import default_targets, libraries, placed
-from .description import (
-    ICON_FILE,
-    TERMINALS_FILE,
-    build_description,
-    compile_note,
-    documentation,
-    filled,
-    icon,
-    model_description,
-    terminals_and_icons,
-)
 from .flavours import FMI_VERSIONS
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
@@ -50,9 +40,8 @@ def files(
     content |= {f"documentation/licenses/{file}": text for file, text in _licenses().items()}
     needs = "The FMU needs nothing but its own binary; on Windows before 10 also the Universal C Runtime (KB2999226)."
     if fmi == "3":
-        content |= {ICON_FILE: icon(model), TERMINALS_FILE: terminals_and_icons(model)}
-    else:
-        content["model.png"] = icon(model)
+        content[description.TERMINALS_FILE] = description.terminals_and_icons(model)
+    content[description.ICON_FILE if fmi == "3" else "model.png"] = description.icon(model)
     if model == "ReferenceTrajectory":
         T_s = spec.machine.T_s
         # NumPy's sine differs by 0.1 fm from one version or processor to another: rounded to 10 pm, archives are alike
@@ -63,12 +52,13 @@ def files(
     if spec.weights is not None:
         content[f"resources/{WEIGHTS_FILE}"] = spec.weights
     run = reference_run(spec) if reference else {}
-    content |= documentation(spec, needs, filled("native_dependencies.txt"), run, sources=compile_note(name, fmi))
+    dependencies, sources = description.filled("native_dependencies.txt"), description.compile_note(name, fmi)
+    content |= description.documentation(spec, needs, dependencies, run, sources=sources)
     guid = content_guid(content, table)
     content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
     content["sources/hsep_fmu.h"] = c_header(table, guid, fmi, spec.weights if embed_weights else None).encode()
-    content["sources/buildDescription.xml"] = build_description(name, fmi)
-    content["modelDescription.xml"] = model_description(spec, guid, f"hybridsep {__version__}")
+    content["sources/buildDescription.xml"] = description.build_description(name, fmi)
+    content["modelDescription.xml"] = description.model_description(spec, guid, f"hybridsep {__version__}")
     content |= run
     compiled = libraries(table.kind, targets or default_targets())
     return content | {f"binaries/{path}": library for path, library in placed(compiled, name, fmi).items()}
@@ -91,5 +81,5 @@ def _licenses() -> dict[str, bytes]:
     return {
         "license.txt": (folder.parent / "LICENSE").read_bytes(),
         "fmi-headers.txt": ("\n".join(lines).rstrip("\n") + "\n").encode(),
-        "compiler-runtime.txt": filled("compiler_runtime.txt", zig=zig, mingw=mingw).encode(),
+        "compiler-runtime.txt": description.filled("compiler_runtime.txt", zig=zig, mingw=mingw).encode(),
     }

@@ -177,6 +177,7 @@ class MatSource(_GivenSource):
 
     format = "MATLAB"
     endings = (".mat",)
+    marks = (b"MATLAB 5.0 MAT-file",)  # of version 5; version 4 has none, and is known by the file's name
 
     def __init__(self, path: Path) -> None:
         from scipy import io  # a quarter of a second, which a text need not wait
@@ -190,11 +191,6 @@ class MatSource(_GivenSource):
                 kind = type(value).__name__ if not isinstance(value, np.ndarray) else "structs"
                 found[name] = LogError(f"{path}: column {brief(name)} must be a full matrix, got {kind}")
         super().__init__(path, found)
-
-    @staticmethod
-    def recognises(head: bytes) -> bool:
-        """Return whether it has the text of version 5; version 4 has none, and is known by the file's name."""
-        return head.startswith(b"MATLAB 5.0 MAT-file")
 
 
 def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -218,6 +214,7 @@ class ParquetSource(ArraysSource):
 
     format = "Parquet"
     endings = (".parquet", ".pq")
+    marks = (b"PAR1",)
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -234,11 +231,6 @@ class ParquetSource(ArraysSource):
         self.names = list(schema.names)
         self.stamps = frozenset(field.name for field in schema if any(is_one(field.type) for is_one in temporal))
         self.units = _field_units(schema)
-
-    @staticmethod
-    def recognises(head: bytes) -> bool:
-        """Return whether it begins with Parquet's mark."""
-        return head.startswith(b"PAR1")
 
     def column(self, name: str) -> Array:
         """Return a column."""

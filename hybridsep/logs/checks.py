@@ -99,11 +99,9 @@ def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 def checked(log: Log) -> tuple[Finding, ...]:
     """Return the notes on a log; LogError where it is refused."""
     findings = check(log)
-    refused = [one for one in findings if one.refused]
-    if refused:
-        error = LogError(f"{log.path}: {'; '.join(one.plain for one in refused)}")
-        error.options = tuple(option for one in refused for option in one.options)
-        raise error
+    if refused := [one for one in findings if one.refused]:
+        options = [option for one in refused for option in one.options]
+        raise LogError(f"{log.path}: {'; '.join(one.plain for one in refused)}", options)
     return findings
 
 

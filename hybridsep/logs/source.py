@@ -31,6 +31,7 @@ class Source(ABC):
 
     format: ClassVar[str]  # its name in messages
     endings: ClassVar[tuple[str, ...]]  # usual ones of its files' names; what a file is, its content tells
+    marks: ClassVar[tuple[bytes, ...]] = ()  # what its files begin with, where that tells them
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -48,10 +49,10 @@ class Source(ABC):
         # Columns that are read; nothing between two delimiters of the latter stands for NaN
         self.commanded, self.measured = "", ""
 
-    @staticmethod
-    def recognises(head: bytes) -> bool:
+    @classmethod
+    def recognises(cls, head: bytes) -> bool:
         """Return whether a file that begins with these bytes, 4 kB if it has as many, is of this format."""
-        return False  # it is no file
+        return head.startswith(cls.marks)
 
     @abstractmethod
     def read(self, names: Sequence[str]) -> Block:

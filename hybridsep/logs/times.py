@@ -123,12 +123,11 @@ def _rows(path: Path, name: str, t: Array, given: float | None, remarks: tuple[s
     mean = float(usual.mean())
     about = _rounded(mean, resolution / max(float(usual.sum()), resolution))
     if given is None:
-        error = LogError(
+        raise LogError(
             f"{path}: time {brief(name)} is rounded too coarsely, {100 * np.mean(steps <= 0.0):.3g} % of the times are "
-            f"not above the one before; say the interval between the rows, about {about:g} s (--T_s {about:g})"
+            f"not above the one before; say the interval between the rows, about {about:g} s (--T_s {about:g})",
+            [(f"--T_s {about:g}", "the rows in their order, so far apart")],
         )
-        error.options = ((f"--T_s {about:g}", "the rows in their order, so far apart"),)
-        raise error
     scale = given / mean
     beyond = (scale * steps > scale * resolution + _GAP * given) | (steps < -2.0 * resolution)
     starts = np.flatnonzero(beyond) + 1
@@ -145,12 +144,11 @@ def _unknown_unit(path: Path, name: str, first: float, interval: float, *, count
     guess = f", or a time in {units[0]}{' since 1970' if since else ''}" if units else ""
     hint = f"--T_s {interval * _CLOCKS[units[0]]:.4g}" if units else ""
     says = "counts samples: it is an index" if counts else f"has an interval of {interval:.6g}, no axis's in s"
-    error = LogError(
+    return LogError(
         f"{path}: column {brief(name)} {says}{guess}; give T_s ({hint or '--T_s'}), or name its unit in the file, "
-        f"'{name:.60} [{units[0] if units else 'ms'}]'"
+        f"'{name:.60} [{units[0] if units else 'ms'}]'",
+        [(hint, "the interval between the rows, s")] if hint else (),
     )
-    error.options = ((hint, "the interval between the rows, s"),) if hint else ()
-    return error
 
 
 def _is_one_of(ratio: float, *known: float) -> bool:
