@@ -18,15 +18,8 @@ from tempfile import gettempdir, mkdtemp
 from typing import Any
 
 import fmpy
+from fmpy import fmi2, fmi3
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
-from fmpy.fmi3 import FMU3Slave
 
 from ..base.errors import FmuError, check_kind, first_line, listed
 from ..base.files import as_path, named_errors
@@ -56,14 +49,14 @@ class _Version:
 
 _VERSIONS = {
     "2": _Version(
-        *(FMU2Slave, fmpy.platform, "fmi2", False),
+        *(fmi2.FMU2Slave, fmpy.platform, "fmi2", False),
         access={"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"},
         c_types={"Real": c_double, "Integer": c_int, "Boolean": c_int},
         state="FMUstate",
         deserialise="deSerialize",
     ),
     "3": _Version(
-        *(FMU3Slave, fmpy.platform_tuple, "fmi3", True),
+        *(fmi3.FMU3Slave, fmpy.platform_tuple, "fmi3", True),
         access={name: name for name in ("Float64", "Int32", "UInt64", "Boolean")} | {"Enumeration": "Int64"},
         c_types={"Float64": c_double, "Int32": c_int32, "UInt64": c_uint64, "Int64": c_int64, "Boolean": c_bool},
         state="FMUState",
@@ -346,10 +339,10 @@ def _instantiate(slave: Any, version: _Version, log: list[tuple[int, str]]) -> N
     if version.prefix == "fmi3":
         slave.instantiate(loggingOn=True, logMessage=lambda _environment, status, _category, text: keep(status, text))
         return
-    functions = fmi2CallbackFunctions()
-    functions.logger = fmi2CallbackLoggerTYPE(lambda _environment, _name, status, _category, text: keep(status, text))
-    functions.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-    functions.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    functions = fmi2.fmi2CallbackFunctions()
+    functions.logger = fmi2.fmi2CallbackLoggerTYPE(lambda _place, _name, status, _kind, text: keep(status, text))
+    functions.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    functions.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
     slave.instantiate(callbacks=functions, loggingOn=True)
 
 

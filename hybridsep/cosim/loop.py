@@ -173,20 +173,15 @@ def _refuse(given: object, message: str) -> None:
 
 # Adapters -------------------------------------------------------------------------------------------------------------
 #
-# A controller's adapter has ``kind``, ``T_s``, ``Np``, ``delay`` and ``late``, a drive's ``T_s`` and ``plant``; both
-# have ``name`` and the methods that the FMUs' describe. What an FMU reports is known after ``initialise``.
+# A controller's adapter has ``kind``, ``T_s``, s, and in samples ``Np``, ``delay``, of the trajectory, and ``late``, of
+# measurements as it is told; a drive's has ``T_s`` and ``plant``; both have ``name`` and the methods that the FMUs'
+# describe. What an FMU reports is known after ``initialise``.
 
 
 class LibraryController:
     """A predictor or compensator after its look-ahead, with the FMU's timing; a run keeps what it has learned."""
 
     name: str = "the controller"  # in error messages
-    # Sampling interval, s; samples in a window, by which it delays the trajectory, and by which it is told that
-    # measurements are late: an FMU's are known after :meth:`initialise`
-    T_s: float
-    Np: int
-    delay: int
-    late: int
 
     def __init__(self, controller: HybridPredictor | SepCompensator, t_init: float | None, unit: str = "m") -> None:
         self._controller, self._t_init, self._unit = controller, t_init, unit

@@ -5,6 +5,7 @@
 
 import json
 from collections.abc import Callable, Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +22,7 @@ from ..evaluate.html_report import Report
 from ..evaluate.verdict import verdict_of
 from ..fmi.archive import build_here
 from ..fmi.spec import fmu_name
-from ..machines.machine import PAPER_SETTINGS, Machine, load_machine
+from ..machines.machine import PAPER_SETTINGS, load_machine
 from ..plants.trajectory import spiral, staircase
 
 Summary = dict[str, dict[str, Any]]
@@ -37,27 +38,24 @@ PRINTED = {
 
 _PEERS = {"n_batches_worse_than_physics": "x_pb", "n_batches_worse_than_hold": "x_hold"}
 
+_PAIR = ("HybridPredictor", "FeedDrive")  # FMUs of a prediction
+
 SEEDS = 10  # noise seeds that a full demonstration's staircase is averaged over
-
-
-def _pair(machine: Machine, out: Path) -> tuple[Path, Path]:
-    predictor, plant = (build_here(machine, one, out) for one in ("HybridPredictor", "FeedDrive"))
-    return predictor, plant
 
 
 def _staircase_case(out: Path, seeds: int, advance: Advance) -> dict[str, Any]:
     machine = load_machine(MACHINES["staircase"])
     command = staircase(machine.T_s)
-    fmus = _pair(machine, out / "fmus")
+    predictor, plant = (build_here(machine, one, out / "fmus") for one in _PAIR)
     runs = []
     for seed in range(seeds):
         advance(f"staircase, FMU against FMU, noise seed {seed}")
         values = PAPER_SETTINGS[machine.name]
-        runs.append(cosimulate(*fmus, command, controller_values=values, plant_values={"seed": seed}))
+        runs.append(cosimulate(predictor, plant, command, controller_values=values, plant_values={"seed": seed}))
     runs[0].save(out / "staircase.csv")
     title = "Staircase (cf. the paper's Fig. 4), FMU against FMU, noise seed 0"
     prediction_figure(runs[0], title, out / "staircase.png")
-    compensated, compensation = compensate(machine, fmus[1], command, out, "staircase", advance, range(seeds))
+    compensated, compensation = compensate(machine, plant, command, out, "staircase", advance, range(seeds))
     compensated["hybrid_warm"].save(out / "staircase_compensated.csv")
     title = "Staircase, compensated: FMU against FMU, noise seed 0"
     tracking_figure(compensated, title, out / "staircase_compensated.png")
@@ -77,19 +75,20 @@ def spiral_case(out: Path, advance: Advance) -> Summary:
     compensated: dict[str, Runs] = {}
     for axis, command in zip(("x", "y"), spiral(), strict=True):
         machine, label = load_machine(MACHINES[f"spiral_{axis}"]), f"spiral, {axis.upper()} axis"
-        fmus = _pair(machine, out / "fmus")
+        predictor, plant = (build_here(machine, one, out / "fmus") for one in _PAIR)
         advance(label)
         values = PAPER_SETTINGS[machine.name]
-        axes[axis] = run = cosimulate(*fmus, command, controller_values=values)
+        axes[axis] = run = cosimulate(predictor, plant, command, controller_values=values)
         case = summary[f"spiral_{axis}"] = {**run.summary(), **_worse(run)}
         case["verdict"] = str(verdict_of(run))
         for name, off in (("friction_alone", "kappa"), ("stiffness_alone", "f")):
             advance(f"{label}, {name.replace('_', ' ')}")
-            case[name] = cosimulate(*fmus, command, controller_values=values, plant_values={off: 0.0}).summary()
+            without = cosimulate(predictor, plant, command, controller_values=values, plant_values={off: 0.0})
+            case[name] = without.summary()
         run.save(out / f"spiral_{axis}.csv")
         title = f"Spiral, {axis.upper()} axis (cf. the paper's Fig. 8), FMU against FMU"
         prediction_figure(run, title, out / f"spiral_{axis}.png")
-        compensated[axis], case["compensation"] = compensate(machine, fmus[1], command, out, label, advance)
+        compensated[axis], case["compensation"] = compensate(machine, plant, command, out, label, advance)
         compensated[axis]["hybrid_warm"].save(out / f"spiral_{axis}_compensated.csv")
         title = f"Spiral, {axis.upper()} axis, compensated: FMU against FMU"
         tracking_figure(compensated[axis], title, out / f"spiral_{axis}_compensated.png")
@@ -136,12 +135,10 @@ def demo(
     """
     out = Path(out)
     seeds = SEEDS if full else 1
-    total, done = seeds + 6 * full + (len(MACHINES) if full else 1) * (2 + len(COMPENSATED)), 0
+    total, done = seeds + 6 * full + (len(MACHINES) if full else 1) * (2 + len(COMPENSATED)), count()
 
     def advance(message: str) -> None:
-        nonlocal done
-        progress(message, done / total)
-        done += 1
+        progress(message, next(done) / total)
 
     summary: Summary = {"staircase": _staircase_case(out, seeds, advance)}
     if full:

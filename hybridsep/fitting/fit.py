@@ -31,21 +31,13 @@ from ..machines.machine import Machine, checked_name, machine_text
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import Prediction
+from . import report as sections
 from .advice import Judged, advice_on, settling_words
 from .build import fit_files, sha256_of, write_commands
 from .choice import Tried, choose_settings, period_finding, settings_to_try, with_window
 from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking, taught
 from .plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
-from .report import (
-    begun_report,
-    write_findings,
-    write_identification,
-    write_moves,
-    write_settings,
-    write_use,
-    write_validation,
-)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -164,17 +156,17 @@ class Fit:
             raise IsADirectoryError(errno.EISDIR, "the report's path must be a file", str(path))
         fmus, judged = [fmus] if isinstance(fmus, str) else fmus, self.judged
         check_kind(Sequence, fmus=fmus)
-        report = begun_report(
+        report = sections.begun_report(
             *(f"Axis {self.machine.name}: from its log to its FMU", self.logs, judged, "Tested on held-out samples"),
             "The first half of each log trained the physics model and chose the settings; these are the errors of the "
             f"second half.{settling_words(judged.replay)}",
         )
         if in_position is not None:
-            write_moves(report, judged, finite(in_position, "in_position", above=0.0))
-        write_findings(report, self.logs, self.findings)
-        write_identification(report, self.identification, judged)
-        write_validation(report, self.identification, judged)
-        write_settings(report, self.choice, judged)
+            sections.write_moves(report, judged, finite(in_position, "in_position", above=0.0))
+        sections.write_findings(report, self.logs, self.findings)
+        sections.write_identification(report, self.identification, judged)
+        sections.write_validation(report, self.identification, judged)
+        sections.write_settings(report, self.choice, judged)
         if self.tracking is not None:
             report.heading("Compensation")
             for line in self.tracking.lines(judged.shown):
@@ -184,7 +176,7 @@ class Fit:
                 report.paragraph(f"{title}:")
                 report.table(head, rows, words=3)
         if fmus:
-            write_use(report, fmus[0], judged.T_s, judged.replay.Np, self.logs[0])
+            sections.write_use(report, fmus[0], judged.T_s, judged.replay.Np, self.logs[0])
             report.paragraph(f"{' and '.join(fmus)} start trained with the log.")
         report.write(path)
 

@@ -160,11 +160,10 @@ class Replay:
 
     def best_ways(self) -> list[Peer]:
         """Return the peers, each fitted in the way that is better over the test samples; none that diverged."""
-        rms = {id(peer): one.rms for peer, one in zip(self.peers, self.scored()[2:-1], strict=True)}
+        scored = zip(self.peers, self.scored()[2:-1], strict=True)
         best: dict[str, Peer] = {}
-        for peer in sorted(self.peers, key=lambda peer: rms[id(peer)]):
-            if not peer.diverged:
-                best.setdefault(peer.name, peer)
+        for peer, _ in sorted((one for one in scored if not one[0].diverged), key=lambda one: one[1].rms):
+            best.setdefault(peer.name, peer)
         return [peer for peer in self.peers if best.get(peer.name) is peer]
 
     def best(self) -> Errors:

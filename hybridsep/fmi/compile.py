@@ -102,17 +102,11 @@ def placed(libraries: Mapping[str, bytes], name: str, fmi: str = FMI_VERSIONS[0]
 
     The model identifier is their stem; FMI 3.0 has one folder for each platform, which is called as the platform is.
     """
-    if fmi == "3":
-        return {f"{key}/{name}{TARGETS[key].suffix}": library for key, library in libraries.items()}
-    files = {
-        f"{TARGETS[key].folder}/{name}{TARGETS[key].suffix}": library
-        for key, library in libraries.items()
-        if key not in _MACS
-    }
-    macs = [libraries[key] for key in _MACS if key in libraries]
-    if macs:
-        files[f"{TARGETS[_MACS[0]].folder}/{name}.dylib"] = universal(macs) if len(macs) > 1 else macs[0]
-    return files
+    files: dict[str, list[bytes]] = {}  # the two Macs' libraries have one place in FMI 2.0
+    for key in (key for key in TARGETS if key in libraries):
+        folder = key if fmi == "3" else TARGETS[key].folder
+        files.setdefault(f"{folder}/{name}{TARGETS[key].suffix}", []).append(libraries[key])
+    return {path: universal(both) if len(both) > 1 else both[0] for path, both in files.items()}
 
 
 def compiler_for(target: str) -> Compiler:

@@ -81,8 +81,7 @@ def axis_header(machine: Machine, model: str, weights: bytes | None = None) -> s
         if name in numbers
     ]
     modes = [f"    {{{mode.f_n!r}, {mode.zeta!r}, {mode.alpha!r}, {mode.beta!r}}}," for mode in machine.model.modes]
-    name = machine.name
-    kind = "compensator" if compensates else "predictor"
+    name, kind = machine.name, "compensator" if compensates else "predictor"
     lines = {"modes": "\n".join(modes), "weights": _weights(name, weights), "settings": "\n".join(settings)}
     return filled("axis.h", version=__version__, name=name, kind=kind, n_modes=len(modes), **lines)
 

@@ -11,19 +11,10 @@ from ..base.settings import check
 from ..base.threads import one_blas_thread
 from ..logs.units import DisplayUnits, shown_in
 from ..model.physics import ModalModel
+from . import selection
 from .model import Alternative, IdentifiedModel
 from .output_error import Delay, Fit, Segment, as_segments, fit_structure, motion_split, simulated
 from .search import fit_near
-from .selection import (
-    HELD_OUT,
-    Candidate,
-    choose,
-    compare_structures,
-    held_out,
-    well_damped,
-    with_slow_part,
-    without_long_delay,
-)
 from .structure import STRUCTURES, Structure
 from .uncertainty import estimates
 
@@ -75,9 +66,9 @@ def identify_operation(
     if reason := _hindrance(segments):
         raise IdentificationError(f"{part} cannot determine a model, because {reason}")
     structures = [structure for structure in STRUCTURES if structure.order <= order_max]
-    candidates = compare_structures(segments, T_s, structures, progress)
-    chosen = with_slow_part(choose(candidates), candidates, segments, T_s)
-    chosen = well_damped(without_long_delay(chosen, segments, T_s), segments, T_s)
+    candidates = selection.compare_structures(segments, T_s, structures, progress)
+    chosen = selection.with_slow_part(selection.choose(candidates), candidates, segments, T_s)
+    chosen = selection.well_damped(selection.without_long_delay(chosen, segments, T_s), segments, T_s)
     candidates = list({one.structure: one for one in (*candidates, chosen)}.values())
     progress(f"{chosen.structure.name}: all samples", 0.95)
     fit = fit_near(segments, T_s, chosen.fit)
@@ -128,9 +119,9 @@ def _hindrance(segments: Sequence[Segment]) -> str:
     measured = [(segment.u[segment.known], segment.y[segment.known]) for segment in segments]
     if all(np.ptp(y) == 0 for _, y in measured):
         return "the measured position does not move"
-    split = motion_split(segments, 1.0 - HELD_OUT)
+    split = motion_split(segments, 1.0 - selection.HELD_OUT)
     n_fitted = sum(int(segment.known[: segment.stop].sum()) for segment in split)
-    n_judging = sum(len(held_out(segment)) for segment in split)
+    n_judging = sum(len(selection.held_out(segment)) for segment in split)
     if n < sum(len(segment.u) for segment in segments) and min(n_fitted, n_judging) < SAMPLES_MIN // 4:
         return (
             f"too many measured positions are missing: {n_fitted} are left in the part that is fitted to, {n_judging} "
@@ -139,7 +130,7 @@ def _hindrance(segments: Sequence[Segment]) -> str:
     return ""
 
 
-def _alternative(candidate: Candidate, chosen: Candidate) -> Alternative:
+def _alternative(candidate: selection.Candidate, chosen: selection.Candidate) -> Alternative:
     fit, objection = candidate.fit, candidate.objection
     if not objection and candidate is not chosen and candidate.slow_parts:
         objection = f"zeros all but cancel a slow part of {candidate.slow_parts[0]:.3g} Hz, and it explains too little"
@@ -148,7 +139,7 @@ def _alternative(candidate: Candidate, chosen: Candidate) -> Alternative:
 
 def _findings(
     fit: Fit,
-    chosen: Candidate,
+    chosen: selection.Candidate,
     segments: Sequence[Segment],
     gain_std: float,
     n_effective: float,

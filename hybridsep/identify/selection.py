@@ -188,10 +188,8 @@ def without_long_delay(chosen: Candidate, segments: Sequence[Segment], T_s: floa
     follow the commands that the regressions look at.
     """
     split = motion_split(segments, 1.0 - HELD_OUT)
-    for fit in shorter_delays(split, T_s, chosen.fit):
-        if (shorter := _in_place_of(chosen, fit, split, T_s)) is not None:
-            return shorter
-    return chosen
+    found = (_in_place_of(chosen, fit, split, T_s) for fit in shorter_delays(split, T_s, chosen.fit))
+    return next(filter(None, found), chosen)
 
 
 def with_slow_part(
@@ -206,8 +204,8 @@ def with_slow_part(
     better = [c for c in candidates if c.rms_held_out < _HELD_OUT_WORTH * chosen.rms_held_out]
     left = [c for c in better if c.objection in ("", *_UNCERTAIN) and c.slow_parts]
     earlier = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in split if s.known[: s.stop].sum() > 1]
-    later = [Segment(s.u[s.stop :], s.y[s.stop :], len(s.u) - s.stop) for s in split if s.known[s.stop :].sum() > 1]
-    later = [Segment(s.u - s.u[0], s.y - s.u[0], s.stop) for s in later]
+    ends = [(s.u[s.stop :], s.y[s.stop :]) for s in split if s.known[s.stop :].sum() > 1]
+    later = [Segment(u - u[0], y - u[0], len(u)) for u, y in ends]
 
     def back(fit: Fit) -> float:  # its error, m, on the earlier part, fitted to the later one
         again = fit_structure(later, T_s, fit.structure, fit.delay, [fit.theta], fit.slowest)
@@ -276,17 +274,11 @@ def _chosen_of(usable: Sequence[Candidate]) -> Candidate:
     for candidate in alike[1:]:
         if candidate.fit.rms < _FITTED_BETTER * chosen.fit.rms:
             chosen = candidate
-    for other in usable:
-        s, c = other.structure, chosen.structure
-        if c == replace(s, unit_gain=True) and not s.unit_gain and c.order:
-            gains = s.gains(other.fit.linear)[0]
-            if (
-                other.rms_held_out <= (1 + TOLERANCE) * chosen.rms_held_out
-                and other.fit.rms < (1 - TOLERANCE) * chosen.fit.rms
-                and gains.sum() > 0
-            ):
-                return other
-    return chosen
+    free = replace(chosen.structure, unit_gain=False)
+    other = next((candidate for candidate in usable if candidate.structure == free), chosen)
+    is_better = other.fit.rms < (1 - TOLERANCE) * chosen.fit.rms and free.gains(other.fit.linear)[0].sum() > 0
+    is_no_worse = other.rms_held_out <= (1 + TOLERANCE) * chosen.rms_held_out
+    return other if free.order and is_better and is_no_worse else chosen
 
 
 def _as_good(candidate: Candidate, best: Candidate) -> bool:

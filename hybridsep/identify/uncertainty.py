@@ -76,9 +76,7 @@ def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array,
         block = np.column_stack((*slopes, columns, by_delay, np.ones(len(x))))
         known = segment.known
         free = free_responses(sections_of(fit.structure, fit.theta, T_s, "zoh"), len(x))[known]
-        both = np.column_stack((block, y - x))[known]
-        if free.size:
-            both = without(free, both)
+        both = without(free, np.column_stack((block, y - x))[known])
         blocks.append(both[:, :-1])
         residuals.append(without(both[:, -2:-1], both[:, -1:])[:, 0])
     return np.concatenate(blocks), np.concatenate(residuals)

@@ -10,7 +10,7 @@ import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -482,7 +482,7 @@ def _travel(x: Array) -> float:
 def _liveliest(log: Log) -> slice:
     """Return the samples of one segment, at most :data:`_SPAN`, in which the command moves most."""
     best, most = slice(0, len(log.t)), -1.0
-    for start, end in zip(log.starts, (*log.starts[1:], len(log.t)), strict=True):
+    for start, end in pairwise((*log.starts, len(log.t))):
         way = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(log.x_d[start:end])))))
         for first in range(0, max(end - start - _SPAN, 0) + 1, _SPAN):
             last = min(first + _SPAN, end - start) - 1

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
 from typing import Any, Protocol
@@ -98,8 +99,7 @@ class Log:
 
     def segments(self) -> "list[Log]":
         """Return each stretch without a gap as a log of its own."""
-        ends = (*self.starts[1:], len(self.t))
-        return [_at(replace(self, starts=(0,)), slice(*piece)) for piece in zip(self.starts, ends, strict=True)]
+        return [_at(replace(self, starts=(0,)), slice(*piece)) for piece in pairwise((*self.starts, len(self.t)))]
 
 
 def read_log(
@@ -360,7 +360,7 @@ def _at_sensor_phase(given: Log) -> tuple[Log, str]:
         if share < _ONE_PHASE:
             continue
         parts = []
-        for start, end in zip(given.starts, (*given.starts[1:], len(given.t)), strict=True):
+        for start, end in pairwise((*given.starts, len(given.t))):
             own = at[(at > start) & (at < end)]
             phase = int(np.bincount(own % n).argmax()) if len(own) else start % n
             parts.append(_at(given, np.arange(start + (phase - start) % n, end, n)))
@@ -382,11 +382,10 @@ def _shifted(given: Log, delay: int) -> tuple[Log, str]:
     parts = [part for part in given.segments() if len(part.t) > abs(delay)]
     if not parts:
         raise ParameterError(f"--delay must be less than the samples of a segment, got {delay}")
-    first, last = max(-delay, 0), max(delay, 0)
-    shifts = [(slice(first, len(part.t) - last), slice(last, len(part.t) - first)) for part in parts]
-    parts = [
-        replace(_at(part, here), x_meas=part.x_meas[there]) for part, (here, there) in zip(parts, shifts, strict=True)
-    ]
+    here, there = slice(-delay, None), slice(None, delay)
+    if delay > 0:
+        here, there = slice(None, -delay), slice(delay, None)
+    parts = [replace(_at(part, here), x_meas=part.x_meas[there]) for part in parts]
     way = f"{abs(delay)} samples {'earlier' if delay > 0 else 'later'}"
     return _joined(parts), f"the measured position is taken {way} than recorded (--delay {delay})"
 

@@ -134,12 +134,8 @@ class SinumerikSource(ArraysSource):
     def _positions(self) -> dict[str, tuple[str, str]]:
         found: dict[str, tuple[str, str]] = {}
         for x_d, signal in self._signals.items():
-            there = [
-                name
-                for pattern in _MEASURED
-                for name, other in self._signals.items()
-                if other.axis == signal.axis and pattern.search(other.name)
-            ]
+            beside = {name: other.name for name, other in self._signals.items() if other.axis == signal.axis}
+            there = [name for pattern in _MEASURED for name, own in beside.items() if pattern.search(own)]
             if there and _COMMANDED.search(signal.name):
                 found.setdefault(signal.axis, (x_d, there[0]))
         return found

@@ -367,10 +367,10 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
     for delimiter in _DELIMITERS:
         rows = [(number, split(line.strip(" \r\n"), delimiter), line) for number, line in lines]
         widths = [0 if line.lstrip().startswith(_COMMENTS) else _width(fields) for _, fields, line in rows]
+        edges = [i for i, (before, now) in enumerate(pairwise([0, *widths, 0])) if now != before]
         for width in {*widths} - {0}:
-            begun = [i for i, (before, now) in enumerate(pairwise([0, *widths])) if now == width != before]
-            ends = [next((i for i in range(one, len(widths)) if widths[i] != width), len(widths)) for one in begun]
-            found = (_with_names(rows, start, end, delimiter) for start, end in zip(begun, ends, strict=True))
+            runs = (run for run in pairwise(edges) if widths[run[0]] == width)
+            found = (_with_names(rows, *run, delimiter) for run in runs)
             if (table := next(filter(None, found), None)) is not None:
                 n = sum(one == width and row[0] >= table.first for one, row in zip(widths, rows, strict=True))
                 # That blanks divide a timestamp makes no column

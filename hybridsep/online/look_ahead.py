@@ -14,7 +14,7 @@ what is measured over the fill. ``t_init`` counts from the end of the fill.
 import math
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -153,6 +153,16 @@ class _Unmodified:
 _KIND = "look-ahead"
 
 
+def _now(signal: str, what: str) -> Any:
+    """Return the property of a look-ahead that is a signal of its window at the sample now."""
+    return property(lambda ahead: float(getattr(ahead.window, signal)[ahead.k % ahead.Np]), doc=what)
+
+
+def _rms(i: int, what: str) -> Any:
+    """Return the property of a look-ahead that is the running RMS of one of its sums of squares."""
+    return property(lambda ahead: math.sqrt(ahead._sums[i] / max(ahead._n_scored, 1)), doc=what)
+
+
 class LookAhead:
     """Delay line of commands, with the position predicted ahead, and the commands modified by a planner.
 
@@ -183,6 +193,18 @@ class LookAhead:
     diverged : str
         Message of the window that diverged, after which every sample is refused; empty before.
     """
+
+    x_d: float = _now("x_d", "Commanded position now, m.")
+    x_dm: float = _now("x_dm", "Modified command now, m; ``x_d`` with a predictor alone.")
+    x_pb: float = _now("x_pb", "Physics-based prediction for now, m.")
+    x_h: float = _now("x_h", "Prediction for now by the best available model, m.")
+    x_h_std: float = _now("x_h_std", "Standard deviation of ``x_meas − x_h`` now, m; 0 where it is not known.")
+    rms_e: float = _rms(0, "Running RMS of the measured servo error ``x_d − x_meas`` since ``t_init``, m; 0 before.")
+    rms_pb: float = _rms(1, "Running RMS of ``x_meas − x_pb`` since ``t_init``, m; 0 before.")
+    rms_h: float = _rms(2, "Running RMS of ``x_meas − x_h`` since ``t_init``, m; 0 before.")
+    rms_hold: float = _rms(
+        3, "Running RMS of hold, ``x_pb`` plus the last residual measured before a window, since ``t_init``, m."
+    )
 
     diverged: str = ""
     _SAVED = (
@@ -237,31 +259,6 @@ class LookAhead:
         return self.k // self.Np
 
     @property
-    def x_d(self) -> float:
-        """Commanded position now, m."""
-        return self._now(self.window.x_d)
-
-    @property
-    def x_dm(self) -> float:
-        """Modified command now, m; ``x_d`` with a predictor alone."""
-        return self._now(self.window.x_dm)
-
-    @property
-    def x_pb(self) -> float:
-        """Physics-based prediction for now, m."""
-        return self._now(self.window.x_pb)
-
-    @property
-    def x_h(self) -> float:
-        """Prediction for now by the best available model, m."""
-        return self._now(self.window.x_h)
-
-    @property
-    def x_h_std(self) -> float:
-        """Standard deviation of ``x_meas − x_h`` now, m; 0 where it is not known."""
-        return self._now(self.window.x_h_std)
-
-    @property
     def e_servo(self) -> float:
         """Predicted servo error ``x_d − x_h``, m."""
         return self.x_d - self.x_h
@@ -292,26 +289,6 @@ class LookAhead:
     def alarm(self) -> bool:
         """Whether the following error was above ``following_error_max``: the change fades until a reset."""
         return self.planner.monitor.is_tripped
-
-    @property
-    def rms_e(self) -> float:
-        """Running RMS of the measured servo error ``x_d − x_meas`` since ``t_init``, m; 0 before."""
-        return self._rms(0)
-
-    @property
-    def rms_pb(self) -> float:
-        """Running RMS of ``x_meas − x_pb`` since ``t_init``, m; 0 before."""
-        return self._rms(1)
-
-    @property
-    def rms_h(self) -> float:
-        """Running RMS of ``x_meas − x_h`` since ``t_init``, m; 0 before."""
-        return self._rms(2)
-
-    @property
-    def rms_hold(self) -> float:
-        """Running RMS of hold, ``x_pb`` plus the last residual measured before a window, since ``t_init``, m."""
-        return self._rms(3)
 
     def sample(self, x_d_ahead: float, x_meas: float, x_load: float = 0.0) -> None:
         """Process sample ``k`` and advance to ``k + 1``.
@@ -389,9 +366,3 @@ class LookAhead:
         window, Np = self.window, self.Np
         hold = window.x_pb + self._residual
         self._compared = np.hstack((self._compared[:, Np:], np.stack((window.x_d, window.x_pb, window.x_h, hold))))
-
-    def _now(self, signal: Array) -> float:
-        return float(signal[self.k % self.Np])
-
-    def _rms(self, i: int) -> float:
-        return math.sqrt(self._sums[i] / self._n_scored) if self._n_scored else 0.0

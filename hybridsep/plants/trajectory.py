@@ -91,12 +91,10 @@ def rest_to_rest(
     x_d = np.full(n, points[0])
     for start, move in moves:
         first = samples_before(start, T_s)
-        for k in range(first, n):
-            t = k * T_s - start
-            if t >= move.duration:
-                x_d[k:] = move.at_time(move.duration)[0][0]
-                break
-            x_d[k] = move.at_time(max(t, 0.0))[0][0]
+        t = np.arange(first, n) * T_s - start
+        moving = t[t < move.duration].tolist()
+        x_d[first:] = move.at_time(move.duration)[0][0]
+        x_d[first : first + len(moving)] = [move.at_time(max(one, 0.0))[0][0] for one in moving]
     return x_d
 
 
