@@ -91,7 +91,8 @@ def judge(
     speed = np.abs(np.diff(x_d, prepend=x_d[:1]))
     fastest = np.maximum.accumulate(np.maximum.reduceat(speed, begin))[window] if len(x) else speed
     moving, third = speed > STANDSTILL * fastest, place * len(_THIRDS) // Np
-    there = dict(zip((*_MOTIONS, *_THIRDS), (~moving, moving, *(third == i for i in range(len(_THIRDS)))), strict=True))
+    there = dict(zip(_MOTIONS, (~moving, moving), strict=True))
+    there |= {name: third == i for i, name in enumerate(_THIRDS)}
     squares = np.where(known, (x - predictions) ** 2, 0.0)
     enough = max(_LEAST_SHARE * n_known, 1.0)
     sums = {name: squares[:, one].sum(axis=1) for name, one in there.items() if (one & known).sum() >= enough}

@@ -98,9 +98,7 @@ def _differences(name: str, then: float, now: float) -> list[str]:
     """Return the message, if any, about a setting with another value than in training."""
     if then == now:
         return []
-    whole = isinstance(now, int)
-    shown = int(then) if whole and then == int(then) else then
-    came = int(now) if whole else now
+    shown, came = (int(one) if isinstance(now, int) and one == int(one) else one for one in (then, now))
     return [f"{name} must be {shown!r}, with which this FMU was trained ({WEIGHTS_FILE}), got {came!r}"]
 
 

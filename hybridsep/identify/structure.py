@@ -82,7 +82,7 @@ class Structure:
 
     def slowest_rate(self, theta: Array) -> float:
         """Return the rate of its slowest pole, 1/s, of one that swings at least its frequency; infinite without any."""
-        omegas, zetas = np.exp(theta[: 2 * self.n_modes : 2]), np.exp(theta[1 : 2 * self.n_modes : 2])
+        omegas, zetas = np.exp(theta[: 2 * self.n_modes]).reshape(-1, 2).T
         decays = omegas * np.where(zetas > 1, zetas - np.sqrt(np.maximum(zetas**2 - 1, 0.0)), zetas)
         rates = np.where(zetas > 1, decays, np.maximum(decays, omegas / (2.0 * np.pi)))
         return float(min([*rates, *np.exp(theta[2 * self.n_modes :])], default=np.inf))
@@ -96,10 +96,10 @@ class Structure:
         gains, betas = self.gains(linear)
         if self.order == 0:
             return [lag_mode(max(T_s / 20, 2e-6), gains[0])]
-        omegas, zetas = np.exp(theta[: 2 * self.n_modes : 2]), np.exp(theta[1 : 2 * self.n_modes : 2])
+        poles = np.exp(theta[: 2 * self.n_modes]).reshape(-1, 2)
         modes = [
             Mode(omega / (2 * np.pi), zeta, gain * omega**2, beta * omega)
-            for omega, zeta, gain, beta in zip(omegas, zetas, gains, betas, strict=False)
+            for (omega, zeta), gain, beta in zip(poles, gains, betas, strict=False)
         ]
         return [*modes, lag_mode(float(np.exp(-theta[-1])), gains[-1])] if self.lag else modes
 
@@ -161,8 +161,7 @@ class Section(NamedTuple):
 def sections_of(structure: Structure, theta: Array, T_s: float, input_hold: str) -> list[Section]:
     """Return the modes and the lag of a structure with nonlinear parameters ``theta``, ``(order,)``."""
     sections = []
-    for i in range(structure.n_modes):
-        omega, zeta = np.exp(theta[2 * i]), np.exp(theta[2 * i + 1])
+    for omega, zeta in np.exp(theta[: 2 * structure.n_modes]).reshape(-1, 2):
         A, b = np.array([[0.0, omega], [-omega, -2 * zeta * omega]]), np.array([0.0, omega])
         sections.append(Section(*discretised_block(A, b, T_s, input_hold)))
     if structure.lag:
