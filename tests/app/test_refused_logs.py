@@ -68,8 +68,8 @@ def test_a_log_without_units_is_refused_with_lines_to_paste(tmp_path: Path, hybr
     command = shlex.split(lines[0], comments=True)
     assert command == ["hybridsep", *map(str, given), "--out", str(tmp_path / "fit"), "--unit", "mm"]
     assert lines[0].endswith("# a linear axis in mm")
-    assert shlex.split(lines[1], comments=True)[-2:] == ["--unit", "deg"]
-    assert "joint" in lines[1]
+    assert [shlex.split(line, comments=True)[-1] for line in lines] == ["mm", "um", "deg"]
+    assert "joint" in lines[2]
 
 
 def test_a_machine_file_that_fit_wrote_is_named(
