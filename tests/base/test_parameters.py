@@ -116,19 +116,10 @@ def test_a_plan_goes_on_behind_a_preview_that_is_shorter_than_the_drive_needs(
     assert settings.horizon == horizon
 
 
-@pytest.mark.parametrize(
-    ("t_init", "T_s", "count"),
-    [
-        (0.0, 1e-3, 0),
-        (0.3, 1e-3, 300),
-        (0.3, 1e-4, 3000),
-        (0.29995, 1e-3, 300),
-        (1.24205, 1e-3, 1243),
-        (0.1 + 0.2, 0.1, 3),  # 0.30000000000000004 / 0.1 is just over three
-        (4e-3 * (1 - 1e-12), 1e-3, 4),
-        (1e-8, 1e-3, 1),
-    ],
-)
+@pytest.mark.parametrize(("t_init", "T_s", "count"), [
+    (0.0, 1e-3, 0), (0.3, 1e-3, 300), (0.3, 1e-4, 3000), (0.29995, 1e-3, 300), (1.24205, 1e-3, 1243),
+    (0.1 + 0.2, 0.1, 3), (4e-3 * (1 - 1e-12), 1e-3, 4), (1e-8, 1e-3, 1),  # (0.1 + 0.2) / 0.1 is just over three
+])  # fmt: skip
 def test_warm_up_is_counted_in_samples(t_init: float, T_s: float, count: int) -> None:
     assert samples_before(t_init, T_s) == count
 
