@@ -62,13 +62,8 @@ def test_signals_of_a_capture_and_of_a_table(tmp_path: Path) -> None:
 
 def test_signals_are_listed(tmp_path: Path) -> None:
     found = {one.name: one.role for one in channels(open_source(write(tmp_path / "log.csv", signals())))}
-    expected = {
-        "DES_POS|1": "planned_position",
-        "CTRL_POS|1": "x_d",
-        "ENC_POS|1": "x",
-        "CTRL_DIFF|1": "following_error",
-    }
-    assert {name: found[name] for name in expected} == expected
+    roles = {"DES_POS|1": "planned_position", "CTRL_POS|1": "x_d", "ENC_POS|1": "x", "CTRL_DIFF|1": "following_error"}
+    assert {name: found[name] for name in roles} == roles
 
 
 def test_a_signal_may_state_a_unit_of_its_own_and_be_missing() -> None:
@@ -84,13 +79,9 @@ def test_remedies_keep_signals_beside_the_pair() -> None:
     """And miss what was not recorded."""
     rows = np.delete(np.arange(N), [120, 121])
     data = {"t": T_S * rows, **{name: values[rows] for name, values in signals().items()}}
-    filled, late, even = (
-        read_log(data, unit="mm"),
-        read_log(data, unit="mm", delay=3),
-        read_log(data, unit="mm", resample=True),
-    )
-    assert (len(filled.x_d), len(late.x_d), len(even.x_d)) == (N, N - 3, N)
-    for log in (filled, late, even):
+    for delay, resample in ((0, False), (3, False), (0, True)):
+        log = read_log(data, unit="mm", delay=delay, resample=resample)
+        assert len(log.x_d) == N - delay
         command = log.signals["loop_command"]
         known = np.isfinite(command)
         assert len(command) - known.sum() == 2
@@ -115,10 +106,8 @@ def test_figures_and_words() -> None:
     assert "(DES_POS) leads the measured one by 7 samples (14 ms)" in delay
     assert following.startswith("following error (CTRL_DIFF): ")
     assert contour.startswith("contour deviation (CONT_DEV): ")
-    assert (
-        "(CTRL_POS) by 6 samples (12 ms); a compensation that is added to that command has these of its Np = 50"
-        in ahead
-    )
+    words = "(CTRL_POS) by 6 samples (12 ms); a compensation that is added to that command has these of its Np = 50"
+    assert words in ahead
 
 
 def test_without_the_command_of_the_loop_the_delay_is_all_that_is_known() -> None:

@@ -49,12 +49,9 @@ class Frame:
         return Labelled(self._columns[name], self.index)
 
 
-class Lazy:
-    def __init__(self, **columns: Any) -> None:
-        self._columns = columns
-
+class Lazy(SimpleNamespace):
     def collect(self) -> Frame:
-        return Frame(**self._columns)
+        return Frame(**vars(self))
 
 
 class Variable:
@@ -80,12 +77,6 @@ def without(mask: np.ndarray, index: Any) -> Frame:
     return Frame(Labelled(index[~mask]), x_d=X_D[~mask], x=X[~mask])
 
 
-def structured() -> np.ndarray:
-    table = np.zeros(N, [("x_d", "f8"), ("x", "f8")])
-    table["x_d"], table["x"] = X_D, GAPS
-    return table
-
-
 MISSING: Mapping[str, Any] = {
     "NaN": {"x_d": X_D, "x": GAPS},
     "masked": {"x_d": X_D, "x": np.ma.array(np.where(GONE, 999.0, X), mask=GONE)},
@@ -95,7 +86,7 @@ MISSING: Mapping[str, Any] = {
     "Decimal": {"x_d": [decimal.Decimal(repr(x)) for x in X_D.tolist()], "x": GAPS},
     "Arrow": pa.table({"x_d": X_D, "x": pa.array(GAPS, from_pandas=True)}),
     "Arrow's batch": pa.record_batch({"x_d": X_D, "x": pa.array(GAPS, from_pandas=True)}),
-    "fields": structured(),
+    "fields": np.array(list(zip(X_D, GAPS, strict=True)), [("x_d", "f8"), ("x", "f8")]),
     "lazy": Lazy(x_d=X_D, x=GAPS),
 }
 
@@ -136,8 +127,7 @@ def test_an_index_of_times_is_the_time(what: str) -> None:
     with pytest.raises(LogError, match=r"T_s = 0\.001 s was given, but column 'index' has an interval of 0\.002 s"):
         read_log(Frame(Labelled(index), x_d=X_D, x=X), T_s=1e-3)
     assert read_log(without(GONE, index)).starts == (0, 1000)
-    own = read_log(Frame(Labelled(index), t=T, x_d=X_D, x=X))
-    assert own.T_s == 1e-3
+    assert read_log(Frame(Labelled(index), t=T, x_d=X_D, x=X)).T_s == 1e-3
 
 
 @pytest.mark.parametrize("step", [1, 3])

@@ -97,11 +97,8 @@ def twincat_csv(
     lines += [f"Endtime of export{mark}{start + 10**7}{mark}Montag, 2. Mai 2022{mark}15:56:25.375", ""]
     lines += ["", row("Name", {name: name for name in channels})]
     lines += [row("SampleTime[ms]", {one: number(1e3 * T_s).removesuffix(",0") for one, (T_s, _) in channels.items()})]
-    lines += [
-        row("SymbolName", {name: f"MAIN.{name}" for name in channels}),
-        row("Unit", dict.fromkeys(channels, unit)),
-        "",
-    ]
+    lines += [row("SymbolName", {name: f"MAIN.{name}" for name in channels})]
+    lines += [row("Unit", dict.fromkeys(channels, unit)), ""]
     for k in range(max(len(values) for _, values in channels.values())):
         cells = []
         for group in groups:
