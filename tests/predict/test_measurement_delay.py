@@ -14,11 +14,7 @@ from hybridsep.predict.predictor import HybridPredictor
 
 NP, DELAY, N = 40, 6, 400
 
-SETTINGS: list[dict[str, Any]] = [
-    {"averaging": True},
-    {"averaging": False, "t_init": 0.0},
-    {"averaging": False, "t_init": 0.063},
-]
+SETTINGS: list[dict[str, Any]] = [{"averaging": True}, *({"averaging": False, "t_init": t} for t in (0.0, 0.063))]
 
 
 def drive() -> tuple[Array, Array]:
@@ -45,8 +41,7 @@ def test_windows_are_predicted_from_the_last_measurement_on(delay: int, settings
     x_d, x_meas = drive()[0], late(delay)
     predictor, peer = new(delay, **settings), new(0, **settings)
     if settings["averaging"]:  # only what is published is judged
-        model = averaged_model(peer)
-        model = replace(model, settings=predictor.settings)
+        model = replace(averaged_model(peer), settings=predictor.settings)
         peer.state = replace(peer.state, residual=model)
     commands = np.concatenate((np.full(delay, x_d[0]), x_d))
     for k in range(0, N, NP):

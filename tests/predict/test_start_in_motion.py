@@ -9,14 +9,8 @@ from hybridsep.base.signals import Array
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.predict.predictor import HybridPredictor
 
-STAGE = ModalModel(
-    [
-        Mode(f_n, zeta, gain * (2 * np.pi * f_n) ** 2, beta)
-        for f_n, zeta, gain, beta in ((30, 0.1, 0.6, 9), (90, 0.05, 0.4, -5))
-    ],
-    dead_time=4,
-)
-"""Two modes of unit static gain together."""
+MODES = ((30, 0.1, 0.6, 9), (90, 0.05, 0.4, -5))  # f_n, Hz, zeta, static gain, beta, 1/s: together of unit static gain
+STAGE = ModalModel([Mode(f, zeta, gain * (2 * np.pi * f) ** 2, beta) for f, zeta, gain, beta in MODES], dead_time=4)
 
 CUT = 400  # samples of a motion before a run
 
@@ -35,11 +29,10 @@ def test_the_state_is_found_in_the_first_window(model: ModalModel, hold: str, de
     """But for what the commands before, which are not known, differ from a constant velocity."""
     x_d, x = in_motion(model, hold)
     x_d, x_meas = x_d[delay:], x[: len(x) - delay]
-    settings = PredictorSettings(input_hold=hold, measurement_delay=delay)
-    predictor = HybridPredictor(model, settings)
-    paper = HybridPredictor(model, PredictorSettings(averaging=False, input_hold=hold, measurement_delay=delay))
     errors = []
-    for each in (predictor, paper):
+    for averaging in (True, False):
+        settings = PredictorSettings(averaging=averaging, input_hold=hold, measurement_delay=delay)
+        each = HybridPredictor(model, settings)
         each.predict(x_d[:100])
         each.update(x_meas[:100])
         errors.append(np.abs(each.predict(x_d[100:200]).x_pb - x[100 + delay : 200 + delay]).max())

@@ -45,20 +45,15 @@ def stop(x_d: Array, distance: float) -> Array:
 
 def formula(x_d: Array, x_pb: Array, x: Array, hold: str, dead_time: int, period: float = 0.0) -> tuple[Array, Array]:
     """Return the filtered disturbances and their first differences, (N, n) each."""
-    numerator, denominator = oracle.transfer_function(MODES)
+    modes = oracle.transfer_function(MODES)
     v_d, v_pb = np.diff(x_d, prepend=0.0) / TS, np.diff(x_pb, prepend=0.0) / TS
     disturbances = [*(np.tanh(v_d / (SCALE * one)) for one in SPREAD), *(stop(x_d, one) for one in DISTANCES)]
     disturbances += [x * abs(x), v_pb * abs(v_pb)]
     if period:
         angle, at_start = 2 * np.pi * (ORIGIN + x) / period, 2 * np.pi * ORIGIN / period
         disturbances += [np.sin(angle) - np.sin(at_start), np.cos(angle) - np.cos(at_start)]
-    filtered = np.column_stack(
-        [
-            oracle.physics(numerator, denominator, one.tolist(), T_s=TS, hold=hold, dead_time=dead_time)
-            for one in disturbances
-        ]
-    )
-    return filtered, np.diff(filtered, axis=0, prepend=np.zeros((1, len(disturbances))))
+    answers = [oracle.physics(*modes, one.tolist(), T_s=TS, hold=hold, dead_time=dead_time) for one in disturbances]
+    return np.array(answers).T, np.diff(answers, prepend=0.0).T
 
 
 @pytest.mark.parametrize("period", [0.0, PERIOD])
@@ -71,9 +66,8 @@ def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int,
     for n in LENGTHS:
         window = slice(first, first + n)
         before = numbers_of(state)
-        more, after = static.rows(
-            state, ResidualWindow(x_d[window], x_pb[window], ORIGIN, x_d[window]), x[window], SCALE
-        )
+        of_residual = ResidualWindow(x_d[window], x_pb[window], ORIGIN, x_d[window])
+        more, after = static.rows(state, of_residual, x[window], SCALE)
         np.testing.assert_array_equal(numbers_of(state), before)  # the state is not changed
         rows.append(more)
         state, first = after, first + n
