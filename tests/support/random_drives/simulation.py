@@ -24,9 +24,7 @@ CUBIC_MAX = 2.0
 
 
 def simulate(
-    models: Sequence[ModalModel],
-    disturbances: Sequence[Disturbances],
-    commands: Sequence[Array],
+    models: Sequence[ModalModel], disturbances: Sequence[Disturbances], commands: Sequence[Array]
 ) -> list[Array]:
     """Return the true positions of drives at rest at their first command.
 
