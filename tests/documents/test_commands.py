@@ -62,11 +62,8 @@ def test_every_block_is_run_or_shown() -> None:
 @pytest.mark.slow
 def test_fmpy_gets_the_communication_step_size() -> None:
     """``step_size`` is nothing to a co-simulation, whose steps fmpy doubles until at most 1000 are left."""
-    calls = [
-        call
-        for page in PAGES
-        for call in re.findall(r"simulate_fmu\((.*?)\n\)", page.read_text(encoding="utf-8"), re.DOTALL)
-    ]
+    texts = [page.read_text(encoding="utf-8") for page in PAGES]
+    calls = [call for text in texts for call in re.findall(r"simulate_fmu\((.*?)\n\)", text, re.DOTALL)]
     assert calls
     assert all("output_interval=1e-3" in call and "step_size" not in call for call in calls)
 
