@@ -23,7 +23,7 @@ from ..fmi.archive import build_fmu
 from ..identify.model import IdentifiedModel, machine_of, of_cascade
 from ..identify.operation import TOO_LITTLE, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
-from ..logs.checks import Finding, checked, commanded
+from ..logs.checks import Finding, checked, moved_by_command
 from ..logs.controller import controller_of
 from ..logs.log import Log, Table, read_log
 from ..logs.units import si_factor
@@ -318,7 +318,7 @@ def fit(
             raise ParameterError(f"{log.path.name} is in {log.unit}, {logs[0].path.name} in {logs[0].unit}")
     findings = {log.path.name: checked(log) for log in logs}
     window = max(1, round(_LOOK_AHEAD / T_s)) if Np is None else Np
-    pieces = [[(one.x_d, commanded(one)) for one in log.segments()] for log in logs]
+    pieces = [[(one.x_d, moved_by_command(one)) for one in log.segments()] for log in logs]
     recordings = [one for of_log in pieces for one in split_log(of_log, _SHARE, window)]
     judging = max(len(recording.x) - recording.n_train for recording in recordings)
     if Np is not None and Np > judging:

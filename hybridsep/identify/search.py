@@ -105,6 +105,7 @@ def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, ra
         if n_modes == 1:
             slow = np.log([0.03 * rate, 0.7, 3.0 * rate])  # integrators beside a fast loop, or a feed-forward
             return [*lags, slow]
+        # Two modes may have been found in the place of one and a lag: then the flexible mode is added to these
         one = min((fit for other, fit in known.items() if other.n_modes == 1 and other.lag), key=lambda fit: fit.rms)
         return [*lags, *(np.concatenate((np.log([omega, 0.1]), one.theta)) for omega in (0.5 * rate, *added[:3]))]
     return [np.concatenate((base, np.log([omega, 0.1]))) for omega in added]

@@ -234,8 +234,8 @@ def _beside_friction(fit: Fit, other: Fit, segments: Sequence[Segment], T_s: flo
         friction, more = np.stack((np.ones(len(x)), sign, *late)).T[s.known], simulated(other, s, T_s) - x
         both = without(friction, np.stack((s.y - x, more)).T[s.known])
         errors.append((both[:, 0], without(both[:, 1:], both[:, :1])[:, 0]))
-    least, most = (float(np.sum(np.concatenate(one) ** 2)) for one in reversed(list(zip(*errors, strict=True))))
-    return float(np.sqrt(least / most))
+    of_friction, of_both = (np.concatenate(one) for one in zip(*errors, strict=True))
+    return float(np.linalg.norm(of_both) / np.linalg.norm(of_friction))
 
 
 def well_damped(chosen: Candidate, segments: Sequence[Segment], T_s: float) -> Candidate:

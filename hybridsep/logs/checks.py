@@ -346,7 +346,7 @@ def _note_missing(log: Log) -> Iterator[Finding]:
         yield Finding("missing samples", words, {"n": float(len(missing))})
 
 
-def commanded(log: Log) -> Array:
+def moved_by_command(log: Log) -> Array:
     """Return a segment's measured positions, ``(n,)``, NaN where something else moves the axis at a command's rest."""
     at, error, x = np.arange(len(log.t)), log.x_meas - log.x_d, np.array(log.x_meas)
     moves, known = np.diff(log.x_d, prepend=log.x_d[:1]) != 0.0, np.isfinite(error)
@@ -367,7 +367,7 @@ def commanded(log: Log) -> Array:
 
 
 def _note_moved_at_rest(log: Log) -> Iterator[Finding]:
-    moved = np.concatenate([np.isnan(commanded(one)) & ~np.isnan(one.x_meas) for one in log.segments()])
+    moved = np.concatenate([np.isnan(moved_by_command(one)) & ~np.isnan(one.x_meas) for one in log.segments()])
     if moved.any():
         n, duration = int((np.diff(moved, prepend=False) & moved).sum()), float(moved.sum()) * log.T_s
         words = (

@@ -18,7 +18,7 @@ from scipy.signal import chirp, lfilter
 from hybridsep import ModalModel, Mode, load_machine, simulate, spiral
 from hybridsep.base.errors import LogError
 from hybridsep.base.signals import Array
-from hybridsep.logs.checks import check, checked, commanded
+from hybridsep.logs.checks import check, checked, moved_by_command
 from hybridsep.logs.log import Log, read_log
 
 GOOD_CASES = CASES.parent / "good"
@@ -360,15 +360,15 @@ def test_what_is_noted_has_a_statistic_and_changes_nothing(name: str) -> None:
 def test_what_moves_an_axis_at_rest_is_not_learned() -> None:
     """Further than its error ever was in motion, until it is back: a quarter of a millimetre may be friction's."""
     log = rested(sines(), 0.02)
-    gone = np.flatnonzero(np.isnan(commanded(log)))
+    gone = np.flatnonzero(np.isnan(moved_by_command(log)))
     assert (gone[0], gone[-1]) == (pytest.approx(3575, abs=75), pytest.approx(4025, abs=75))
-    assert not np.isnan(commanded(rested(sines(), 2.5e-4))).any()
+    assert not np.isnan(moved_by_command(rested(sines(), 2.5e-4))).any()
     (note,) = [one for one in check(log) if one.name == "moved at rest"]
     assert note.evidence == {"n": 1.0, "duration": pytest.approx(1e-3 * len(gone))}
     away = replace(log, x_meas=np.concatenate((log.x_meas[:3800], np.full(700, log.x_meas[3800]))))  # not back
-    assert np.isnan(commanded(away)[3700:]).all()
+    assert np.isnan(moved_by_command(away)[3700:]).all()
     log.x_meas[3301] = np.nan  # among the samples that tell where it stood
-    assert np.isnan(commanded(log)).sum() == len(gone) + 1
+    assert np.isnan(moved_by_command(log)).sum() == len(gone) + 1
 
 
 def test_noise_moves_no_axis() -> None:
@@ -377,7 +377,7 @@ def test_noise_moves_no_axis() -> None:
     log = log_of(x_d, x_d + np.random.default_rng(4).normal(0.0, 1e-6, len(x_d)))
     log.x_meas[[20_000, 50_000]] += 1e-4  # two outliers
     for one in (log, *replace(log, starts=(0, 3100)).segments()):
-        assert not np.isnan(commanded(one)).any()
+        assert not np.isnan(moved_by_command(one)).any()
 
 
 @pytest.mark.parametrize("rest", [0.1, 0.8])
