@@ -56,8 +56,15 @@ static void replay_take_over(hsep_predictor *predictor, hsep_predictor *trained)
 }
 
 /* Return whether both runs were predicted without divergence. */
-int replay(const hsep_predictor_parameters *parameters, const replayed_run *first, const replayed_run *second)
+int replay(const hsep_parameters *given, const replayed_run *first, const replayed_run *second)
 {
+    const uint64_t Np = given->predictor.Np;
+    hsep_predictor_parameters all = {.settings = given->predictor, .averaging = given->averaging};
+    const hsep_predictor_parameters *parameters = &all;
+    all.preview = all.horizon = Np;
+    all.n_init = (double)Np;
+    all.n_modes = given->n_modes;
+    all.modes = given->modes;
     const size_t size = (size_t)hsep_predictor_lay_out(&(hsep_predictor){0}, parameters);
     hsep_predictor *trained = malloc(size), *learned = malloc(size), *predictor = malloc(size);
     int sound = trained != NULL && learned != NULL && predictor != NULL;

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from c_library import PARTS as SETTINGS
-from c_library import Mode
+from c_library import Mode, Parameters
 
 from hybridsep.base.errors import SignalError
 from hybridsep.base.settings import PredictorSettings
@@ -34,19 +34,6 @@ Changes = Mapping[str, Sequence[tuple[str, str]]]
 """Path of a file below ``fmu_src/c/core`` → pairs of a text in it, and what replaces it."""
 
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
-
-
-class _Parameters(ctypes.Structure):
-    _fields_ = (
-        ("settings", SETTINGS["predictor"]),
-        ("averaging", SETTINGS["averaging"]),
-        ("preview", ctypes.c_uint64),
-        ("horizon", ctypes.c_uint64),
-        ("n_init", ctypes.c_double),
-        ("planned", ctypes.c_int),
-        ("n_modes", ctypes.c_uint64),
-        ("modes", ctypes.POINTER(Mode)),
-    )
 
 
 class _Run(ctypes.Structure):
@@ -100,16 +87,8 @@ class CoreVariant:
         """
         fmi = {**settings.to_fmi(), "dead_time": model.dead_time, "averaging": 1}
         modes = (Mode * len(model.modes))(*(Mode(one.f_n, one.zeta, one.alpha, one.beta) for one in model.modes))
-        parameters = _Parameters(
-            _filled(SETTINGS["predictor"], fmi),
-            _filled(SETTINGS["averaging"], fmi),
-            settings.Np,
-            settings.Np,
-            float(settings.Np),
-            0,
-            len(modes),
-            modes,
-        )
+        parameters = Parameters(*(_filled(SETTINGS[part], fmi) for part in ("predictor", "averaging")))
+        parameters.n_modes, parameters.modes = len(modes), modes
         signals = [
             [np.ascontiguousarray(one, dtype=np.float64) for one in (x_d, x, np.zeros(len(x_d)), np.zeros(len(x_d)))]
             for x_d, x in (first, second)
