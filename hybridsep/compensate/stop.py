@@ -20,9 +20,7 @@ _TRIES = 12
 last one each time, and none where eight fail, an axis with 50 ms of look-ahead stood 6 mm off: the next window asked
 for the same (``docs/experiments/2026-11-29-stops-by-bisection.md``)."""
 
-_STILL, _NOTHING = 1e-12, 1e-6
-"""Row of the last stop's own part, in limits, below which that part does not matter there; and largest row up to which
-it counts nowhere: a multiple of it that makes room for a plan would be rounding."""
+_STILL = 1e-12  # row of the last stop's own part, in limits, below which that part does not matter there
 
 
 class Stop:
@@ -56,8 +54,6 @@ class Stop:
         of_old, own = self.rows @ old, self.rows @ (old - self._stopping @ old[:n])
         low, high = np.minimum(low, of_old) - ROUNDING, np.maximum(high, of_old) + ROUNDING
         start, way = of_old - own, self.rows @ now - (of_old - own)
-        if np.max(np.abs(own), initial=0.0) <= _NOTHING:
-            own = np.zeros_like(own)
         # Lengths and shares that keep all bounds are a convex set with the last stop in it: the longest by bisection
         length, share, too_long, tried = 0.0, 1.0, 1.0, 1.0
         for _ in range(_TRIES):
@@ -80,11 +76,14 @@ class Stop:
 
 
 def _share(rows: Array, own: Array, low: Array, high: Array) -> float | None:
-    """Return the share of the last stop's own part, nearest 0, with which all rows keep their bounds; None: none."""
+    """Return the least share, 0 to 1, of the last stop's own part with which all rows keep their bounds; None: none.
+
+    Others could make room too, but that part is a difference: a thousand times it would be a thousand times rounding.
+    """
     matters = np.abs(own) > _STILL
     if not np.all(matters | ((rows >= low) & (rows <= high))):
         return None
     to_low, to_high = (low - rows)[matters] / own[matters], (high - rows)[matters] / own[matters]
-    least = float(np.max(np.minimum(to_low, to_high), initial=-np.inf))
-    most = float(np.min(np.maximum(to_low, to_high), initial=np.inf))
-    return min(max(0.0, least), most) if least <= most else None
+    least = float(np.max(np.minimum(to_low, to_high), initial=0.0))
+    most = float(np.min(np.maximum(to_low, to_high), initial=1.0))
+    return least if least <= most else None

@@ -54,7 +54,6 @@
 /* hybridsep/compensate/stop.py */
 #define HSEP_STOP_TRIES 12
 #define HSEP_STOP_STILL 1e-12
-#define HSEP_STOP_NOTHING 1e-06
 /* clang-format on */
 
 #endif

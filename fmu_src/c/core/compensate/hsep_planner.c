@@ -494,13 +494,14 @@ static void stop_bounds(hsep_stop *self, const hsep_planner *planner, const hsep
     }
 }
 
-/* Share of the last stop's own part, nearest 0, with which all rows keep their bounds, so far on the way; NaN: none. */
+/* Least share, 0 to 1, of the last stop's own part with which all rows keep their bounds, so far on the way; NaN: none.
+ * Others could make room too, but that part is a difference: a thousand times it would be a thousand times rounding. */
 static hsep_real stop_share(const hsep_stop *self, hsep_real length)
 {
     const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);
     const hsep_real *start = hsep_at_const(self, self->start), *way = hsep_at_const(self, self->way);
     const hsep_real *own = hsep_at_const(self, self->own_rows);
-    hsep_real least = -INFINITY, most = INFINITY;
+    hsep_real least = 0.0, most = 1.0;
     for (hsep_int r = 0; r < HSEP_ORDERS * self->preview; r++) {
         const hsep_real row = start[r] + length * way[r];
         if (hsep_fabs(own[r]) > HSEP_STOP_STILL) {
@@ -511,7 +512,7 @@ static hsep_real stop_share(const hsep_stop *self, hsep_real length)
             return (hsep_real)NAN;
         }
     }
-    return least <= most ? hsep_fmin(hsep_fmax(0.0, least), most) : (hsep_real)NAN;
+    return least <= most ? least : (hsep_real)NAN;
 }
 
 HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self)
@@ -531,7 +532,7 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     const hsep_int first = HSEP_N_DECIDED + self->shared, rows = HSEP_ORDERS * self->preview;
     hsep_real *last = hsep_at(self, self->last), *own = hsep_at(self, self->own), *now = hsep_at(self, self->now);
     hsep_real *start = hsep_at(self, self->start), *way = hsep_at(self, self->way);
-    hsep_real *own_rows = hsep_at(self, self->own_rows), most = 0.0;
+    hsep_real *own_rows = hsep_at(self, self->own_rows);
     hsep_real length = 0.0, share = 1.0, too_long = 1.0, tried = 1.0;
     hsep_copy(own, last, first);
     stop_behind(self, own);
@@ -547,10 +548,6 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     for (hsep_int r = 0; r < rows; r++) {
         start[r] -= own_rows[r];
         way[r] -= start[r];
-        most = hsep_fmax(most, hsep_fabs(own_rows[r]));
-    }
-    if (most <= HSEP_STOP_NOTHING) {
-        hsep_zero(own_rows, rows);
     }
     for (int tries = 0; tries < HSEP_STOP_TRIES && length < 1.0; tries++) { /* convex, with the last stop in it */
         const hsep_real found = stop_share(self, tried);
