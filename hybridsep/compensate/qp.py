@@ -73,8 +73,8 @@ def minimise(
     x, m = start.copy(), len(rows)
     s, share = np.maximum(B @ x - b, _FIRST_SLACK), cost / len(b)
     z, inner, beyond = tolerance.first_mu * share / s, None, tolerance.margin
-    # Where active bounds hardly differ, rounding in rowsᵀ W rows would outgrow P
-    rho = _REGULARISATION * float(np.max(np.sum(rows**2, axis=0)) / np.max(np.diag(P)))
+    # Where active bounds hardly differ, rounding in rowsᵀ W rows would outgrow P. The first spline is never a wide one
+    rho = _REGULARISATION * float(rows[:, 0] @ rows[:, 0] / np.max(np.diag(P)))
     steps = 0
     while True:
         mu = float(s @ z) / len(s)

@@ -53,6 +53,8 @@ def test_random_loops_command_the_same(seed: int, model: str, fixed: dict[str, f
         (149, COMPENSATOR, 0.1745, 200, 500, {}),  # a plan does not depend on the splines that it does not change
         # A stop takes no more than all of the last one's own part, which may be rounding
         (10020, f"{COMPENSATOR}_als25010_x", -3.3, 45, 300, {"preview": 112, "horizon": 254}),
+        # Wide splines count in nothing that regularises a programme
+        (10305, COMPENSATOR, 0.17453292, 143, 262, {}),
     ],
 )
 def test_rounded_and_shifted_loops_differ_as_one_binary_place_of_the_measurement_does(
