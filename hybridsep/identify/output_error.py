@@ -7,13 +7,16 @@ projection (Golub, Pereyra, Inverse Problems 19 (2003) R1), so that the search i
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
+from scipy.signal import lfilter
 
+from ..base.metrics import rms
 from ..base.signals import Array, as_measured, as_samples
-from .structure import Structure, free_responses, responses, sections_of
+from .structure import Structure, polynomials
 
 SAMPLES_MAX = 60_000  # samples that are used of long recordings: the parts in which the axis moves most
 _PIECE = 6_000  # samples of one part of a long recording
@@ -81,6 +84,12 @@ _ROWS_MAX = 4000
 """Residuals that take part in a search, evenly spaced: the filters run over every sample, but neighbouring residuals
 tell the same."""
 
+_DEPENDENT = 1e-12  # size of a direction, relative to the largest, below which columns of unit norm do not span it
+_STEP = 1e-5  # step of the differences of responses, in the logarithm of a parameter
+
+_LEAST = 1e-290  # goes on after an impulse: numbers that underflow take many times as long
+_LEAD = 4  # zeros before a command: of a second order the numerators of derivatives look so far back
+
 _EDGE = 0.01  # distance from a bound, in the logarithm of a parameter, within which it counts as at the bound
 
 
@@ -115,7 +124,35 @@ class Fit:
     at_bound: bool  # whether a nonlinear parameter is at the end of its range, but for a lag that acts at once
 
 
-class _Problem:
+class _Basis(NamedTuple):
+    """Orthonormal basis of what columns span."""
+
+    q: Array  # (n, rank)
+    inverse: Array  # (k, rank): ``inverse @ q.T @ y`` are the least-squares coefficients of the columns
+
+    @classmethod
+    def of(cls, columns: Array) -> "_Basis":
+        """Return the basis of columns ``(n, k)``; of those that are zero, or follow from others, none is part."""
+        q, r = np.linalg.qr(columns)
+        norms = np.linalg.norm(r, axis=0)
+        norms[norms == 0.0] = 1.0
+        u, s, vt = np.linalg.svd(r / norms, full_matrices=False)
+        there = s > _DEPENDENT * s.max(initial=0.0)
+        inverse = vt[there].T / s[there] / norms[:, None]
+        return cls(q, inverse @ u.T) if there.all() else cls(q @ u[:, there], inverse)
+
+
+class _Solved(NamedTuple):
+    """Solution of the linear part for one set of poles."""
+
+    residual: Array  # (n,), m
+    linear: Array  # (n_linear,)
+    offset: float  # mean of the segments' offsets, m
+    basis: _Basis  # of the linear parameters' columns, without what offset and initial states explain of them
+    segments: list[tuple[_Basis, Array]]  # what these explain of a segment, and that part of its columns and target
+
+
+class Problem:
     """Separable least-squares problem of a structure with one dead time."""
 
     def __init__(
@@ -125,51 +162,113 @@ class _Problem:
         used = [segment for segment in segments if segment.known[: segment.stop].sum() > 1]
         step = max(1, sum(s.stop for s in used) // rows_max)
         self._data = [
-            (delayed(s.u[: s.stop], delay.samples), s.y[rows], rows)
+            (np.pad(np.stack((delayed(s.u[: s.stop], delay.samples), impulse)), ((0, 0), (_LEAD, 0))), s.y[rows], rows)
             for s in used
             for rows in [np.flatnonzero(s.known[: s.stop])[::step]]
+            for impulse in [np.append(1.0, np.full(s.stop - 1, _LEAST))]
         ]
-        # A derivative changes one mode: the others' responses are there already
-        self._responses = lru_cache(8 * len(used))(self._responses_of)
+        self._divided = lru_cache(8 * len(used))(self._divided_by)
+        self._last = lru_cache(2)(self._solved)  # a search asks twice for its start, and for each point that it takes
 
-    def solve(self, theta: Array) -> tuple[Array, Array, float]:
-        """Return residual, linear parameters and mean offset for one set of poles."""
-        blocks = [self._signals(theta, i) for i in range(len(self._data))]
-        both = np.concatenate([without(free, signals).T for signals, free in blocks], axis=1)
-        Phi, target = both[:-1].T, both[-1]
-        norms = np.linalg.norm(Phi, axis=0)
-        norms[norms == 0] = 1.0
-        linear: Array = np.linalg.lstsq(Phi / norms, target, rcond=1e-12)[0] / norms  # with columns of unit norm
-        means = [signals.mean(axis=0) for signals, _ in blocks]
-        return target - Phi @ linear, linear, float(np.mean([one[-1] - one[:-1] @ linear for one in means]))
+    def solve(self, theta: Array) -> _Solved:
+        """Return the solution for one set of poles."""
+        return self._last(*theta.tolist())
 
-    def _signals(self, theta: Array, i: int) -> tuple[Array, Array]:
-        """Return columns and, last, the target; and what offset and initial states may add to them.
+    def _solved(self, *theta: float) -> _Solved:
+        segments, left, means = [], [], []
+        for i in range(len(self._data)):
+            free, signals = self.signals(theta, i)
+            basis = _Basis.of(free)
+            inside = basis.q.T @ signals
+            segments.append((basis, inside))
+            left.append(signals - basis.q @ inside)
+            means.append(signals.mean(axis=0))
+        both = np.concatenate(left)
+        basis = _Basis.of(both[:, :-1])
+        linear: Array = basis.inverse @ (basis.q.T @ both[:, -1])
+        offset = float(np.mean([one[-1] - one[:-1] @ linear for one in means]))
+        return _Solved(both[:, -1] - both[:, :-1] @ linear, linear, offset, basis, segments)
+
+    def jacobian(self, theta: Array) -> Array:
+        """Return the derivatives of the residual, ``(n, order)``, by Golub and Pereyra from those of the responses."""
+        at, structure, n = self.solve(theta), self._structure, self._structure.n_modes + self._structure.lag
+        gains, betas = structure.gains(at.linear)
+        columns, cuts = [], np.cumsum([len(y) for _, y, _ in self._data])[:-1]
+        for mode, part in enumerate(self.parts(theta.tolist())):
+            weights, states = np.array([gains[mode], *betas[mode : mode + 1]]), slice(1 + 2 * mode, 3 + 2 * mode)
+            slopes, told, known = [], np.zeros((len(part), 2 * n)), np.zeros((len(part), len(at.linear)))
+            for i, (residual, (basis, inside)) in enumerate(zip(np.split(at.residual, cuts), at.segments, strict=True)):
+                by_command, by_state = self.slopes_of(i, part)
+                own = basis.inverse @ (inside[:, -1] - inside[:, :-1] @ at.linear)
+                slope = -weights[: by_command.shape[1]] @ by_command - own[states] @ by_state
+                by_own = (by_state @ residual) @ basis.inverse[states]
+                slopes.append(slope - (slope @ basis.q + by_own) @ basis.q.T)
+                told[:, [mode, n + mode][: by_command.shape[1]]] += by_command @ residual
+                known += by_own @ inside[:, :-1]
+            slope, raw = np.concatenate(slopes, axis=1), told[:, : n + structure.zero * structure.n_modes]
+            by_linear = affine(structure, raw, np.zeros(len(raw)))[0] - known
+            columns.append(slope - (slope @ at.basis.q + by_linear @ at.basis.inverse) @ at.basis.q.T)
+        return np.asarray(np.concatenate(columns).T)
+
+    def parts(self, theta: Sequence[float]) -> list[tuple[float, ...]]:
+        """Return the nonlinear parameters of each mode and of the lag."""
+        m = 2 * self._structure.n_modes
+        return [tuple(theta[i : i + 2]) for i in range(0, m, 2)] + ([tuple(theta[m:])] if self._structure.lag else [])
+
+    def signals(self, theta: Sequence[float], i: int) -> tuple[Array, Array]:
+        """Return what offset and initial states may add; and columns and, last, the target; ``(n, k)`` each.
 
         The filters run over every sample; some samples, all of them measured, have residuals.
         """
-        structure, (u, y, rows), m = self._structure, self._data[i], 2 * self._structure.n_modes
-        parts = [*theta[:m].reshape(-1, 2), *theta[m:].reshape(-1, 1)]
-        found = [self._responses(i, *part.tolist()) for part in parts]
-        forced = [one[:1] for one, _ in found] + [one[1:] for one, _ in found] or [u[None, rows]]
-        columns, target = affine(structure, np.concatenate(forced).T, y)
+        y = self._data[i][1]
+        found = [self._responses_of(i, part) for part in self.parts(theta)]
+        forced = [one[:1] for one, _ in found] + [one[1:] for one, _ in found] or [
+            self._late(self._data[i][0][0], 1, i)
+        ]
+        columns, target = affine(self._structure, np.concatenate(forced).T, y)
         free = np.concatenate((np.ones((1, len(y))), *(one for _, one in found)))
-        return np.concatenate((columns.T, target[None])).T, free.T
+        return free.T, np.concatenate((columns.T, target[None])).T
 
-    def _responses_of(self, i: int, *theta: float) -> tuple[Array, Array]:
+    def _responses_of(self, i: int, theta: tuple[float, ...]) -> tuple[Array, Array]:
         """Return the responses of one mode, or of the lag, to the command and to initial states, ``(k, n)``."""
-        (u, _, rows), is_mode = self._data[i], len(theta) == 2
-        one = Structure(int(is_mode), lag=not is_mode, zero=self._structure.zero)
-        sections = sections_of(one, np.array(theta), self._T_s, self._input_hold)
-        return responses(one, sections, u).T[:, rows], free_responses(sections, len(u)).T[:, rows]
+        (u, impulse), n = self._divided(i, 1, theta), len(theta)
+        return self._section(theta)[0] @ self._late(u, n + 1, i), self._late(impulse, n, i)
+
+    def slopes_of(self, i: int, theta: tuple[float, ...]) -> tuple[Array, Array]:
+        """Return the derivatives of the responses with respect to each parameter, ``(n_parameters, k, n)``.
+
+        Of ``b/a``, polynomials in z⁻¹, they are ``b'/a − b a'/a²``.
+        """
+        b, n, by_command, by_state = self._section(theta)[0], len(theta), [], []
+        once, (u, impulse) = self._late(self._divided(i, 1, theta)[0], n + 1, i), self._divided(i, 2, theta)
+        twice, impulse = self._late(u, 2 * n + 1, i), self._late(impulse, 2 * n, i)
+        for step in _STEP * np.eye(n):
+            (b_0, a_0), (b_1, a_1) = self._section(theta - step), self._section(theta + step)
+            b_slope, a_slope = (b_1 - b_0) / (2.0 * _STEP), (a_1 - a_0) / (2.0 * _STEP)
+            by_command.append(b_slope @ once - np.stack([np.convolve(one, a_slope) for one in b]) @ twice)
+            by_state.append(-np.stack([np.convolve(one, a_slope) for one in np.eye(n)]) @ impulse)
+        return np.stack(by_command), np.stack(by_state)
+
+    def _divided_by(self, i: int, times: int, theta: tuple[float, ...]) -> Array:
+        """Return a command, and an impulse, divided once or twice by the denominator of a mode, or of the lag."""
+        signals = self._data[i][0] if times == 1 else self._divided(i, times - 1, theta)
+        return np.asarray(lfilter([1.0], self._section(theta)[1], signals))
+
+    def _late(self, signal: Array, n: int, i: int) -> Array:
+        """Return the rows of a signal as it is, and 1 to n − 1 samples late, ``(n, m)``."""
+        rows = self._data[i][2] + _LEAD
+        return signal[rows - np.arange(n)[:, None]]
+
+    def _section(self, theta: Sequence[float] | Array) -> tuple[Array, Array]:
+        """Return the numerators that are of use, ``(1 or 2, k)``, and the denominator of a mode, or of the lag."""
+        numerators, denominator = polynomials(theta, self._T_s, self._input_hold)
+        return numerators[: 1 + self._structure.zero], denominator
 
 
 def without(nuisance: Array, signals: Array) -> Array:
     """Return signals, ``(n, m)``, less their least-squares projection onto the nuisance columns, ``(n, k)``."""
-    norms = np.linalg.norm(nuisance, axis=0)
-    there = norms > 0.0  # in few samples an initial state may show nowhere, and explains nothing then
-    basis = np.linalg.qr(nuisance[:, there] / norms[there])[0]
-    return np.asarray(signals - basis @ (basis.T @ signals))
+    q = _Basis.of(nuisance).q
+    return np.asarray(signals - q @ (q.T @ signals))
 
 
 def affine(structure: Structure, columns: Array, y: Array) -> tuple[Array, Array]:
@@ -194,21 +293,25 @@ def fit_structure(
 
     ``slowest``, rad/s, bounds the natural frequencies from below; about ``rows_max`` residuals take part.
     """
-    problem = _Problem(segments, T_s, structure, delay, rows_max)
+    problem = Problem(segments, T_s, structure, delay, rows_max)
     (low, high), searched = structure.bounds(T_s, slowest), structure.searched
 
     def relative_residual(found: Array, theta: Array, scale: float) -> Array:
         theta[searched] = found
-        return problem.solve(theta)[0] / scale
+        return problem.solve(theta).residual / scale
+
+    def derivatives(found: Array, theta: Array, scale: float) -> Array:
+        theta[searched] = found
+        return problem.jacobian(theta)[:, searched] / scale
 
     best: Fit | None = None
     for start in starts if structure.order else [np.empty(0)]:
         theta = np.clip(start, low + 1e-9, high - 1e-9)
         if structure.order:
-            scale = float(np.sqrt(np.mean(problem.solve(theta)[0] ** 2))) or 1.0
+            scale = rms(problem.solve(theta).residual) or 1.0
             theta[searched] = least_squares(
                 relative_residual,
-                *(theta[searched],),
+                *(theta[searched], derivatives),
                 args=(theta, scale),
                 bounds=(low[searched], high[searched]),
                 xtol=1e-6,
@@ -216,18 +319,18 @@ def fit_structure(
                 gtol=1e-10,
                 max_nfev=_EVALUATIONS_MAX,
             ).x
-        residual, linear, offset = problem.solve(theta)
-        rms = float(np.sqrt(np.mean(residual**2)))
-        if best is None or rms < best.rms:
+        at = problem.solve(theta)
+        error = rms(at.residual)
+        if best is None or error < best.rms:
             at_bound = bool((theta < low + _EDGE).any() or (theta > high - _EDGE)[: 2 * structure.n_modes].any())
-            best = Fit(structure, delay, theta, linear, offset, rms, slowest, at_bound)
+            best = Fit(structure, delay, theta, at.linear, at.offset, error, slowest, at_bound)
     assert best is not None  # there is a start
     return best
 
 
 def simulated(fit: Fit, segment: Segment, T_s: float) -> Array:
     """Return the position of the fitted model, which starts at rest as the predictor does, ``(n,)``, m."""
-    u = delayed(segment.u, fit.delay.samples)
-    columns = responses(fit.structure, sections_of(fit.structure, fit.theta, T_s, fit.delay.input_hold), u)
-    gains, betas = fit.structure.gains(fit.linear)
-    return columns @ np.concatenate((gains, betas if fit.structure.zero else []))
+    n = len(segment.u)
+    problem = Problem([Segment(segment.u, np.zeros(n), n)], T_s, fit.structure, fit.delay, n)
+    signals = problem.signals(fit.theta.tolist(), 0)[1]
+    return np.asarray(signals[:, :-1] @ fit.linear - signals[:, -1])

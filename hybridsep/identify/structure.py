@@ -2,11 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from ..base.signals import Array
 from ..model.discrete import discretised_block
@@ -18,8 +16,6 @@ _ZETA_RANGE = (0.003, 5.0)
 FASTEST = 0.25
 """Highest natural frequency in multiples of the sampling frequency: with fewer than four samples a period a log does
 not resolve a mode, and its replay is refused."""
-
-_UNDERFLOW = 700.0  # time constants in which numbers fall to the least that are normal
 
 RATES_MIN = 5.0  # time constants, or periods, of a pole within the recording, at least: slower ones look like drift
 
@@ -127,75 +123,23 @@ STRUCTURES = tuple(replace(form, unit_gain=unit_gain) for form in _FORMS for uni
 """Structures by number of parameters, the simplest first."""
 
 
-class Section(NamedTuple):
-    """Discrete mode or lag: ``s(k+1) = A s(k) + b u(k)``, its states being ``s + d u``.
+def polynomials(theta: Sequence[float] | Array, T_s: float, input_hold: str) -> tuple[Array, Array]:
+    """Return numerators ``(m, m + 1)`` and denominator ``(m + 1,)``, in z⁻¹, of a mode, m = 2, or of the lag, m = 1.
 
-    The first state is the response with a static gain of 1, the second one of a mode ``ω s/(s² + 2 ζ ω s + ω²)``.
+    ``theta``, ``(m,)``, are its nonlinear parameters. The first numerator is the response's with a static gain of 1,
+    the second one that of a mode ``ω s/(s² + 2 ζ ω s + ω²)``.
     """
-
-    A: Array
-    b: Array
-    d: Array
-
-    @property
-    def denominator(self) -> Array:
-        """Coefficients in z⁻¹."""
-        if len(self.b) == 1:
-            return np.array([1.0, -self.A[0, 0]])
-        A = self.A
-        return np.array([1.0, -A[0, 0] - A[1, 1], A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]])
-
-    def numerators(self) -> list[Array]:
-        """Return each state's coefficients in z⁻¹, of ``(z I − A)⁻¹ b + d``."""
-        A, b = self.A, self.b
-        if len(b) == 1:
-            adjugate = [np.array([0.0, b[0]])]
-        else:
-            adjugate = [
-                np.array([0.0, b[0], A[0, 1] * b[1] - A[1, 1] * b[0]]),
-                np.array([0.0, b[1], A[1, 0] * b[0] - A[0, 0] * b[1]]),
-            ]
-        return [part + d * self.denominator for part, d in zip(adjugate, self.d, strict=True)]
-
-
-def sections_of(structure: Structure, theta: Array, T_s: float, input_hold: str) -> list[Section]:
-    """Return the modes and the lag of a structure with nonlinear parameters ``theta``, ``(order,)``."""
-    sections = []
-    for omega, zeta in np.exp(theta[: 2 * structure.n_modes]).reshape(-1, 2):
+    if len(theta) == 2:
+        omega, zeta = np.exp(theta)
         A, b = np.array([[0.0, omega], [-omega, -2 * zeta * omega]]), np.array([0.0, omega])
-        sections.append(Section(*discretised_block(A, b, T_s, input_hold)))
-    if structure.lag:
-        rate = np.exp(theta[-1])
-        sections.append(Section(*discretised_block(np.array([[-rate]]), np.array([rate]), T_s, input_hold)))
-    return sections
-
-
-def responses(structure: Structure, sections: Sequence[Section], u: Array) -> Array:
-    """Return the responses whose weighted sum is the position, ``(n, n_columns)``, m.
-
-    First the responses of modes and lag, with a static gain of 1, then the responses of the modes' zeros; ``u``, (n,),
-    m, is the command after the dead time, 0 before.
-    """
-    if not sections:
-        return u[:, None]
-    positions, velocities = [], []
-    for section in sections:
-        numerators, denominator = section.numerators(), section.denominator
-        positions.append(lfilter(numerators[0], denominator, u))
-        if structure.zero and len(numerators) == 2:
-            velocities.append(lfilter(numerators[1], denominator, u))
-    return np.asarray(np.stack(positions + velocities).T)
-
-
-def free_responses(sections: Sequence[Section], n: int) -> Array:
-    """Return the responses to initial states without a command, ``(n, order)``."""
-    columns, i = np.zeros((n, sum(len(section.b) for section in sections)), order="F"), 0
-    for section in sections:
-        slowest = float(np.abs(np.linalg.eigvals(section.A)).max())
-        # Numbers that underflow take many times as long
-        m = min(n, round(_UNDERFLOW / max(1.0 - slowest, 1.0 / n)))
-        response = lfilter([1.0], section.denominator, np.eye(1, m)[0])
-        for late in range(len(section.b)):
-            columns[late:m, i] = response[: m - late]
-            i += 1
-    return columns
+    else:
+        b = np.exp(np.asarray(theta))
+        A = -b[None]
+    A, b, d = discretised_block(A, b, T_s, input_hold)
+    trace = A.trace()
+    columns, denominator = [np.zeros(len(b)), b], [1.0, -trace]
+    if len(theta) == 2:
+        columns.append(A @ b - trace * b)
+        denominator.append(A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0])
+    # s(k+1) = A s(k) + b u(k), the states being s + d u: (z I − A)⁻¹ b + d
+    return np.column_stack(columns) + np.outer(d, denominator), np.array(denominator)

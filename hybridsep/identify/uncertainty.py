@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.signals import Array
-from .output_error import Fit, Segment, affine, delayed, without
-from .structure import free_responses, responses, sections_of
+from .output_error import Fit, Problem, Segment, simulated, without
 
 _BATCHES = 30  # batches of the residual: enough for a variance, and each long beside a servo's memory
-_STEP = 1e-5  # step of the differences in the logarithms of the poles, and of the relative ones in the delta method
+_STEP = 1e-5  # relative step of the differences in the delta method
 
 
 @dataclass(frozen=True)
@@ -61,22 +60,18 @@ def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array,
 
     What initial states explain is projected out.
     """
-    blocks, residuals = [], []
-    for segment in segments:
-        u, y = delayed(segment.u, fit.delay.samples), segment.y
-
-        def position(theta: Array, u: Array = u) -> tuple[Array, Array]:
-            sections = sections_of(fit.structure, theta, T_s, fit.delay.input_hold)
-            columns, less = affine(fit.structure, responses(fit.structure, sections, u), np.zeros(len(u)))
-            return columns @ fit.linear - less, columns
-
-        (x, columns), theta, steps = position(fit.theta), fit.theta, _STEP * np.eye(len(fit.theta))
-        slopes = [(position(theta + step)[0] - position(theta - step)[0]) / (2 * _STEP) for step in steps]
-        by_delay = -np.gradient(x)
-        block = np.column_stack((*slopes, columns, by_delay, np.ones(len(x))))
-        known = segment.known
-        free = free_responses(sections_of(fit.structure, fit.theta, T_s, "zoh"), len(x))[known]
-        both = without(free, np.column_stack((block, y - x))[known])
+    problem = Problem(segments, T_s, fit.structure, fit.delay, sum(segment.stop for segment in segments))
+    (gains, betas), theta, blocks, residuals = fit.structure.gains(fit.linear), fit.theta.tolist(), [], []
+    for i, segment in enumerate(segments):
+        free, signals = problem.signals(theta, i)
+        slopes = [np.empty((0, len(signals)))]
+        for mode, part in enumerate(problem.parts(theta)):
+            by_command, _ = problem.slopes_of(i, part)
+            slopes.append(np.array([gains[mode], *betas[mode : mode + 1]])[: by_command.shape[1]] @ by_command)
+        by_delay = -np.gradient(simulated(fit, segment, T_s))[segment.known]
+        residual = signals[:, -1] - signals[:, :-1] @ fit.linear
+        block = np.column_stack((np.concatenate(slopes).T, signals[:, :-1], by_delay, np.ones(len(signals)), residual))
+        both = without(free[:, 1:], block)
         blocks.append(both[:, :-1])
         residuals.append(without(both[:, -2:-1], both[:, -1:])[:, 0])
     return np.concatenate(blocks), np.concatenate(residuals)
