@@ -10,7 +10,6 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
-from scipy.signal import lombscargle
 
 from ..base.signals import Array
 from ..model.physics import ModalModel
@@ -27,6 +26,7 @@ _MOVING = 0.02
 """Velocity in multiples of the largest below which the axis counts as at rest, where samples tell of no position."""
 
 _ROWS_MAX, _LINES_MAX = 4000, 6000  # samples and lines of a spectrum at most: its cost is their product
+_BLOCK = 64  # lines whose waves are the first one's times a few
 _OVERSAMPLED = 5.0  # lines a width of the spectrum's resolution, the reciprocal of the travel
 _RESOLVED = 0.02  # part of the resolution to which a period is rounded
 
@@ -58,10 +58,8 @@ def residual_period(pieces: Iterable[tuple[Array, Array]], model: ModalModel, T_
     moving = [np.sign(v), v / np.abs(v).max(), a / max(float(np.abs(a).max()), 1e-300)]
     known = np.column_stack((np.ones(len(s)), x, x**2, *moving))
     rest = without(known, e)
-    n_lines = int(min(_LINES_MAX, _OVERSAMPLED * travel * (highest - lowest) + 2))
-    lines = lowest + np.arange(n_lines) / (_OVERSAMPLED * travel)
-    power = lombscargle(s, rest, 2.0 * np.pi * lines)
-    peak, width = float(lines[np.argmax(power)]), 1.0 / (_OVERSAMPLED * travel)
+    n_lines, width = int(min(_LINES_MAX, _OVERSAMPLED * travel * (highest - lowest) + 2)), 1.0 / (_OVERSAMPLED * travel)
+    peak = lowest + width * float(np.argmax(_spectrum(s, rest, lowest, width, n_lines)))
     best = minimize_scalar(
         lambda line: float(np.sum(without(np.column_stack((known, _waves(s, line))), e) ** 2)),
         bounds=(max(lowest, peak - 3.0 * width), peak + 3.0 * width),
@@ -73,6 +71,18 @@ def residual_period(pieces: Iterable[tuple[Array, Array]], model: ModalModel, T_
     period, within = 1.0 / best, _RESOLVED / (best**2 * travel)
     rounded = (float(f"{period:.{digits}e}") for digits in range(17))  # to as few digits as the resolution has
     return next((one for one in rounded if abs(one - period) <= within), period)
+
+
+def _spectrum(s: Array, e: Array, lowest: float, width: float, n: int) -> Array:
+    """Return what a wave of each of ``n`` lines, ``width`` apart, explains of a residual, ``(n,)``, m²."""
+    first, further = (np.arange(0, n, _BLOCK), np.arange(_BLOCK))
+    begins, within = (np.exp(2j * np.pi * np.outer(k, s)) for k in (lowest + width * first, width * further))
+    e_wave = ((begins * e) @ within.T).ravel()[:n]  # Σ e cos + i Σ e sin
+    square = (begins**2 @ (within**2).T).ravel()[:n]  # Σ (cos² − sin²) + i Σ 2 cos sin
+    # The least squares' normal equations of cosine and sine
+    total, c, d = float(len(s)), e_wave.real, e_wave.imag
+    numerator = c**2 * (total - square.real) + d**2 * (total + square.real) - 2.0 * c * d * square.imag
+    return np.asarray(2.0 * numerator / (total**2 - np.abs(square) ** 2))
 
 
 def _predicted(s: Array, known: Array, e: Array, line: float) -> float:
