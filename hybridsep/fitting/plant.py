@@ -12,12 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.signal import lfilter
 
 from ..base.errors import ParameterError
 from ..base.metrics import rms
 from ..base.settings import PARAMETERS, PredictorSettings
 from ..base.signals import Array
-from ..identify.output_error import in_time
+from ..identify.output_error import delayed, in_time
+from ..identify.structure import polynomials
 from ..logs.checks import noise_std, resolution, starts_in_motion
 from ..logs.units import DisplayUnits
 from ..model.discrete import DiscreteModel
@@ -103,10 +105,16 @@ class _Piece:
 
 def _errors(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece]) -> list[Array]:
     """Return what was measured of each piece less the plant's position, ``(n,)``, m, with the sensor's offset."""
-    discrete, found = plant.model.discretise(settings.T_s, settings.input_hold), []
+    of_modes = []
+    for mode in plant.model.modes:
+        theta, weights = np.log([mode.omega, mode.zeta]), np.array([mode.alpha / mode.omega**2, mode.beta / mode.omega])
+        numerators, denominator = polynomials(theta, settings.T_s, settings.input_hold)
+        of_modes.append((weights @ numerators, denominator))
+    found = []
     for one in pieces:
         disturbance = plant.f * np.tanh(one.v_d / plant.v_friction) + plant.kappa * one.path * np.abs(one.path)
-        found.append(np.asarray(one.x - discrete.forced_response(discrete.rest(), one.u - disturbance)[0]))
+        u = delayed(one.u - disturbance, plant.model.dead_time)
+        found.append(np.asarray(one.x - sum(lfilter(*of_mode, u) for of_mode in of_modes)))
     return found
 
 
