@@ -257,7 +257,7 @@ class Problem:
     def _late(self, signal: Array, n: int, i: int) -> Array:
         """Return the rows of a signal as it is, and 1 to n − 1 samples late, ``(n, m)``."""
         rows = self._data[i][2] + _LEAD
-        return signal[rows - np.arange(n)[:, None]]
+        return np.asarray(signal[rows - np.arange(n)[:, None]])
 
     def _section(self, theta: Sequence[float] | Array) -> tuple[Array, Array]:
         """Return the numerators that are of use, ``(1 or 2, k)``, and the denominator of a mode, or of the lag."""
