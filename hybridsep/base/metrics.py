@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -172,3 +172,29 @@ def in_unit(figures: Mapping[str, Any], unit: str) -> dict[str, Any]:
 
 def _shown(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+class Move(NamedTuple):
+    """Move of a log, from its first sample to the next move's."""
+
+    start: float  # s, from the beginning of the piece
+    largest: float  # largest servo error, m
+    settling: float  # s from the end of the command until the error stays within the window; inf where it never does
+
+
+_REST = 10  # samples without a change of the command that end a move
+
+
+def moves_of(x_d: Array, x: Array, T_s: float, in_position: float) -> list[Move]:
+    """Return the moves of a command and its measured positions, ``(n,)``, m, NaN where missing."""
+    changes = np.flatnonzero(np.diff(x_d) != 0.0)
+    if not len(changes):
+        return []
+    ends = np.append(np.flatnonzero(np.diff(changes) > _REST), len(changes) - 1)
+    firsts, lasts = changes[np.append(0, ends[:-1] + 1)], changes[ends] + 1
+    error, found = np.abs(x_d - x), []
+    for first, last, until in zip(firsts, lasts, np.append(firsts[1:], len(x_d)), strict=True):
+        outside = np.flatnonzero(error[last:until] > in_position)
+        late = 0.0 if not len(outside) else T_s * (outside[-1] + 1.0) if outside[-1] + 1 < until - last else math.inf
+        found.append(Move(T_s * float(first), float(np.nanmax(error[first:until], initial=0.0)), late))
+    return found

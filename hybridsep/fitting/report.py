@@ -3,13 +3,12 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from ..base.metrics import coverage
+from ..base.metrics import coverage, moves_of
 from ..base.signals import Array
 from ..evaluate.html_report import HOLD, HYBRID, PHYSICS, Chart, Line, Report
 from ..identify.model import IdentifiedModel
@@ -213,32 +212,6 @@ def _write_spectra(report: Report, judged: Judged) -> None:
     lines = [Line(name, f[1:], row[1:], colour) for name, row, colour in zip(_NAMES, amplitude, _COLOURS, strict=True)]
     report.heading("Spectra of the errors")
     report.chart(Chart("frequency [Hz]", (f"density [{unit}/√Hz]",), lines, x_log=True, y_log=True))
-
-
-class Move(NamedTuple):
-    """Move of a log, from its first sample to the next move's."""
-
-    start: float  # s, from the beginning of the piece
-    largest: float  # largest servo error, m
-    settling: float  # s from the end of the command until the error stays within the window; inf where it never does
-
-
-_REST = 10  # samples without a change of the command that end a move
-
-
-def moves_of(x_d: Array, x: Array, T_s: float, in_position: float) -> list[Move]:
-    """Return the moves of a command and its measured positions, ``(n,)``, m, NaN where missing."""
-    changes = np.flatnonzero(np.diff(x_d) != 0.0)
-    if not len(changes):
-        return []
-    ends = np.append(np.flatnonzero(np.diff(changes) > _REST), len(changes) - 1)
-    firsts, lasts = changes[np.append(0, ends[:-1] + 1)], changes[ends] + 1
-    error, found = np.abs(x_d - x), []
-    for first, last, until in zip(firsts, lasts, np.append(firsts[1:], len(x_d)), strict=True):
-        outside = np.flatnonzero(error[last:until] > in_position)
-        late = 0.0 if not len(outside) else T_s * (outside[-1] + 1.0) if outside[-1] + 1 < until - last else math.inf
-        found.append(Move(T_s * float(first), float(np.nanmax(error[first:until], initial=0.0)), late))
-    return found
 
 
 def write_moves(report: Report, judged: Judged, in_position: float) -> None:
