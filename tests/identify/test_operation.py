@@ -13,7 +13,7 @@ from hybridsep.base.errors import IdentificationError
 from hybridsep.base.signals import Array
 from hybridsep.identify.model import IdentifiedModel
 from hybridsep.identify.operation import TOO_LITTLE, identify_operation, unit_gain_model
-from hybridsep.identify.output_error import Delay, as_segments, fit_structure, without
+from hybridsep.identify.output_error import Delay, Problem, as_segments, fit_structure, without
 from hybridsep.identify.selection import slow_parts
 from hybridsep.identify.structure import Structure, lag_mode
 from hybridsep.identify.uncertainty import estimates
@@ -286,6 +286,20 @@ def test_an_initial_state_that_shows_nowhere_explains_nothing() -> None:
     ones = np.ones((3, 1))
     np.testing.assert_array_equal(without(np.zeros((3, 1)), ones), ones)
     np.testing.assert_allclose(without(np.column_stack((ones, np.zeros(3))), ones), 0.0 * ones, atol=1e-15)
+
+
+@pytest.mark.parametrize("unit_gain", [True, False])
+@pytest.mark.parametrize(("n_modes", "lag"), [(0, True), (1, False), (2, True)])
+def test_the_derivatives_are_those_of_the_residual(n_modes: int, lag: bool, unit_gain: bool) -> None:
+    x_d, structure = moves(900), Structure(n_modes, lag=lag, zero=True, unit_gain=unit_gain)
+    x = np.where(np.arange(900) // 30 == 4, np.nan, measured(SECOND, x_d, "foh", 1e-6))
+    pieces = [(x_d[:400], x[:400]), (x_d[400:], x[400:])]
+    problem = Problem(as_segments(pieces), T_S, structure, Delay(1), 4000)
+    theta = np.log([150.0, 0.5, 400.0, 0.1][: 2 * n_modes] + [90.0] * lag)
+    steps = 1e-5 * np.eye(len(theta))
+    ahead, back = ([problem.solve(theta + sign * step).residual for step in steps] for sign in (1, -1))
+    slopes = (np.stack(ahead) - np.stack(back)) / 2e-5
+    np.testing.assert_allclose(problem.jacobian(theta).T, slopes, atol=1e-5 * np.abs(slopes).max())
 
 
 def test_too_many_missing_measurements_are_refused() -> None:
