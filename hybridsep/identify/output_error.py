@@ -6,7 +6,7 @@ projection (Golub, Pereyra, Inverse Problems 19 (2003) R1), so that the search i
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -158,7 +158,8 @@ class Problem:
     def __init__(
         self, segments: Sequence[Segment], T_s: float, structure: Structure, delay: Delay, rows_max: int
     ) -> None:
-        self._structure, self._T_s, self._input_hold = structure, T_s, delay.input_hold
+        self._structure = structure
+        self._section = partial(polynomials, T_s=T_s, input_hold=delay.input_hold, zero=structure.zero)
         used = [segment for segment in segments if segment.known[: segment.stop].sum() > 1]
         step = max(1, sum(s.stop for s in used) // rows_max)
         self._data = [
@@ -258,11 +259,6 @@ class Problem:
         """Return the rows of a signal as it is, and 1 to n − 1 samples late, ``(n, m)``."""
         rows = self._data[i][2] + _LEAD
         return np.asarray(signal[rows - np.arange(n)[:, None]])
-
-    def _section(self, theta: Sequence[float] | Array) -> tuple[Array, Array]:
-        """Return the numerators that are of use, ``(1 or 2, k)``, and the denominator of a mode, or of the lag."""
-        numerators, denominator = polynomials(theta, self._T_s, self._input_hold)
-        return numerators[: 1 + self._structure.zero], denominator
 
 
 def without(nuisance: Array, signals: Array) -> Array:

@@ -123,11 +123,13 @@ STRUCTURES = tuple(replace(form, unit_gain=unit_gain) for form in _FORMS for uni
 """Structures by number of parameters, the simplest first."""
 
 
-def polynomials(theta: Sequence[float] | Array, T_s: float, input_hold: str) -> tuple[Array, Array]:
-    """Return numerators ``(m, m + 1)`` and denominator ``(m + 1,)``, in z⁻¹, of a mode, m = 2, or of the lag, m = 1.
+def polynomials(
+    theta: Sequence[float] | Array, T_s: float, input_hold: str, *, zero: bool = True
+) -> tuple[Array, Array]:
+    """Return numerators ``(1 or 2, m + 1)`` and denominator, in z⁻¹, of a mode, m = 2, or of the lag, m = 1.
 
     ``theta``, ``(m,)``, are its nonlinear parameters. The first numerator is the response's with a static gain of 1,
-    the second one that of a mode ``ω s/(s² + 2 ζ ω s + ω²)``.
+    with a ``zero`` the second one that of a mode ``ω s/(s² + 2 ζ ω s + ω²)``.
     """
     if len(theta) == 2:
         omega, zeta = np.exp(theta)
@@ -142,4 +144,4 @@ def polynomials(theta: Sequence[float] | Array, T_s: float, input_hold: str) -> 
         columns.append(A @ b - trace * b)
         denominator.append(A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0])
     # s(k+1) = A s(k) + b u(k), the states being s + d u: (z I − A)⁻¹ b + d
-    return np.column_stack(columns) + np.outer(d, denominator), np.array(denominator)
+    return (np.column_stack(columns) + np.outer(d, denominator))[: 1 + zero], np.array(denominator)
