@@ -102,7 +102,7 @@ class PlanModel:
         self._state, self._late, self._start, self._path = state, late, start, np.concatenate((late, path))
         self._load = load
         window = self._window(x_d)
-        self.scales, _ = model.scales_of(window)
+        self.scales = model.scales_of(window)
         self._solved = model.solved(self.scales)
         counts = np.arange(len(late) + len(x_d))
         behind = counts[len(late) + model.settings.Np :]

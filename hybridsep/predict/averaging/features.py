@@ -15,7 +15,6 @@ are a constant and the increments ``x_d(k−d−j) − x_d(k−d−j−1)``, ``j
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -181,8 +180,18 @@ class StaticFeatures:
 
     def stops(self, state: StaticState, x_d: Array, velocity_scale: float) -> Array:
         """Return the stop operators over a window, ``(n, N_STOPS)``, m."""
-        steps, distances = np.diff(x_d, prepend=state.x_d[-1]), self.distances(velocity_scale)
-        return _stops(*(tuple(one.tolist()) for one in (steps, state.stops, distances)))
+        steps, found = np.diff(x_d, prepend=state.x_d[-1]).tolist(), np.empty((len(x_d), N_STOPS))
+        for i, distance in enumerate(self.distances(velocity_scale).tolist()):
+            u, of_operator = float(state.stops[i]), []
+            for step in steps:
+                u += step
+                if u > distance:  # min and max take three times as long
+                    u = distance
+                elif u < -distance:
+                    u = -distance
+                of_operator.append(u)
+            found[:, i] = of_operator
+        return found
 
     def velocity(self, state: StaticState, x_d: Array) -> Array:
         """Return the commanded velocity over a window, ``(n,)``, m/s."""
@@ -261,19 +270,3 @@ class StaticFeatures:
         rows[:, first + self.n_disturbances :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
         before = past[-_DIFFERENCES - 1 :].copy()
         return rows, StaticState(filters, filtered[-1].copy(), commands[len(x_d) :], before, stops[-1].copy())
-
-
-@lru_cache(2)  # a window's are asked for with each position that the stiffness acts at
-def _stops(steps: tuple[float, ...], begins: tuple[float, ...], distances: tuple[float, ...]) -> Array:
-    found = np.empty((len(steps), len(distances)))
-    for i, (u, distance) in enumerate(zip(begins, distances, strict=True)):
-        of_operator = []
-        for step in steps:
-            u += step
-            if u > distance:  # min and max take three times as long
-                u = distance
-            elif u < -distance:
-                u = -distance
-            of_operator.append(u)
-        found[:, i] = of_operator
-    return found

@@ -229,8 +229,8 @@ class AveragedModel:
         )
         return replace(self, learned=learned, evidence=(of_physics, of_command))
 
-    def scales_of(self, window: ResidualWindow) -> tuple[FeatureScales, Array]:
-        """Return the scales of the features, with the next window's, and its static features.
+    def scales_of(self, window: ResidualWindow) -> FeatureScales:
+        """Return the scales of the features, with the next window's.
 
         A compensator begins to move before its path, with a creep.
         """
@@ -247,7 +247,7 @@ class AveragedModel:
         rows, _ = static.rows(self.run.static, window, window.x_pb, velocity)
         largest = np.zeros(static.n) if outgrown else learned.largest
         largest = np.maximum(largest, np.abs(rows).max(axis=0)) if velocity > 0.0 else np.ones(static.n)
-        return FeatureScales(velocity, largest, step), rows
+        return FeatureScales(velocity, largest, step)
 
     def solved(self, scales: FeatureScales) -> dict[Regression, SolvedExpert]:
         """Return the regressions that know something, with their weights."""
@@ -261,17 +261,16 @@ class AveragedModel:
         scales: FeatureScales,
         like: AveragedForecast | None = None,
         counts: NDArray[np.intp] | None = None,
-        rows: Array | None = None,
     ) -> AveragedForecast:
         """Predict as :meth:`forecast` by the regressions of :meth:`solved`.
 
         ``like``: under other commands, with the same path: its shrinking is held; ``counts``, (n,): as
-        :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it; ``rows``: as :meth:`scales_of`.
+        :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
         """
         x, path, held = window.x_pb, window.raw_commands, like.predictions if like else {}
         memory = like.memory if like else self.run.memory.append_commands(path[: self.static.n_known], self.settings.Np)
         recalled = memory.recalled(len(path))
-        rows = self.static.rows(self.run.static, window, x, scales.velocity)[0] if rows is None else rows
+        rows, _ = self.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, rows, {}, recalled)
         if STATIC in solved:
             # The stiffness acts at the position, which the physics model alone does not give well enough.
@@ -299,8 +298,8 @@ class AveragedModel:
 
         ``scales``: by :meth:`scales_of` from its commands if left out; a compensator takes its preview's.
         """
-        scales, rows = self.scales_of(window) if scales is None else (scales, None)
-        return self.forecast_by(self.solved(scales), window, scales, rows=rows)
+        scales = self.scales_of(window) if scales is None else scales
+        return self.forecast_by(self.solved(scales), window, scales)
 
     def begin_in_motion(self, window: ResidualWindow, scales: FeatureScales) -> AveragedModel:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin.
