@@ -191,7 +191,10 @@ class Problem:
         return _Solved(both[:, -1] - both[:, :-1] @ linear, linear, offset, basis, segments)
 
     def jacobian(self, theta: Array) -> Array:
-        """Return the derivatives of the residual, ``(n, order)``, by Golub and Pereyra from those of the responses."""
+        """Return the derivatives of the residual, ``(n, order)``.
+
+        Of ``r = y - M c``, by Golub and Pereyra: ``-P M' c - (M⁺)ᵀ M'ᵀ r``, where P takes away what M explains.
+        """
         at, structure, n = self.solve(theta), self._structure, self._structure.n_modes + self._structure.lag
         gains, betas = structure.gains(at.linear)
         columns, cuts = [], np.cumsum([len(y) for _, y, _ in self._data])[:-1]
@@ -221,11 +224,9 @@ class Problem:
 
         The filters run over every sample; some samples, all of them measured, have residuals.
         """
-        y = self._data[i][1]
+        (u, _), y, _ = self._data[i]
         found = [self._responses_of(i, part) for part in self.parts(theta)]
-        forced = [one[:1] for one, _ in found] + [one[1:] for one, _ in found] or [
-            self._late(self._data[i][0][0], 1, i)
-        ]
+        forced = [one[:1] for one, _ in found] + [one[1:] for one, _ in found] or [self._late(u, 1, i)]
         columns, target = affine(self._structure, np.concatenate(forced).T, y)
         free = np.concatenate((np.ones((1, len(y))), *(one for _, one in found)))
         return free.T, np.concatenate((columns.T, target[None])).T
