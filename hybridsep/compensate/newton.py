@@ -9,8 +9,8 @@ lowers the cost; the next window goes on from there. The first samples of a plan
 made while they act; the steps of the solver are limited, so that the work fits into these samples. Predictions are
 shrunk by their variance, so where the model knows nothing the plan is the physics model's.
 
-The slope at given commands is ``sech²(v/v_i)`` for friction and ``2|x|`` for stiffness. The weights of the experts and
-of the stack, and the shrinking by the variance, are held constant:
+The slope at given commands is ``sech²(v/v_i)`` for friction and ``2|x|`` for stiffness. Stop operators, the weights of
+the experts and of the stack, and the shrinking by the variance, are held constant:
 
 ``∂x_h = (1 − π_A) G_pb + π_L ∂f_L + π_S ∂f_S + π_A ∂x_A``
 
@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from ..base.signals import Array
@@ -39,17 +38,13 @@ _OWN_REACH = 1e-3
 the friction's is the tangent."""
 
 
-_AT_STOP = 0.999999  # share of its distance from which on a stop operator is at its stop: rounding may have moved it
 _APART = 4  # samples behind the window that share the variance of the first one's features
 
 
 class DisturbanceSlopes(NamedTuple):
-    """Slopes of the disturbances at given commands."""
+    """Slopes of the disturbances at given commands; stop operators count as constant."""
 
     friction: Array  # (n, N_FRICTION), s/m: of each friction with the commanded velocity
-    stops: Array  # (N_STOPS,), 1/m: of each stop operator with the command, since it was at its stop
-    # (n, N_STOPS) of int: last sample at which it was there, counted from 1; 0: before all of them
-    at_stop: NDArray[np.intp]
     # (n,), m and m/s: of ``x·|x|`` with ``x`` and of ``v·|v|`` with ``v``
     stiffness: Array
     damping: Array
@@ -58,28 +53,21 @@ class DisturbanceSlopes(NamedTuple):
 
     def behind(self, n: int) -> "DisturbanceSlopes":
         """Return the slopes behind the first ``n`` samples."""
-        at_stop = np.maximum(self.at_stop[n:] - n, 0)
-        friction, stops, _, *others = self
-        return DisturbanceSlopes(friction[n:], stops, at_stop, *(one[n:] for one in others))
+        return DisturbanceSlopes(*(one[n:] for one in self))
 
-    def change(self, weights: Array, changes: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
+    def change(self, weights: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
         """Return what the disturbances change by, ``(n, m)``, with weights ``(n_disturbances,)``.
 
-        ``weights``: (n_disturbances,); ``changes``: (n, m), m: changes of the commands, each a column; ``velocity``:
-        (n, m), m/s: changes of the commanded velocity, each a column; ``moved``, ``moved_velocity``: (n, m), m and
-        m/s: changes of the position, and of its velocity.
+        ``weights``: (n_disturbances,); ``velocity``: (n, m), m/s: changes of the commanded velocity, each a column;
+        ``moved``, ``moved_velocity``: (n, m), m and m/s: changes of the position, and of its velocity.
         """
         stiffness = N_FRICTION + N_STOPS
         of_position = weights[stiffness] * self.stiffness + self.of_position @ weights[N_LASTING:]
         of_velocity = self.friction @ weights[:N_FRICTION]
         if n_own := self.of_velocity.shape[1]:
             of_velocity = of_velocity + self.of_velocity @ weights[-n_own:]
-        of_stops, moves = np.zeros_like(changes), np.concatenate((np.zeros_like(changes[:1]), changes))
-        for i, weight in enumerate(self.stops * weights[N_FRICTION:stiffness]):
-            of_stops += weight * (changes - moves[self.at_stop[:, i]])
         return np.asarray(
-            of_stops
-            + of_velocity[:, None] * velocity
+            of_velocity[:, None] * velocity
             + of_position[:, None] * moved
             + (weights[stiffness + 1] * self.damping)[:, None] * moved_velocity
         )
@@ -188,8 +176,8 @@ class PlanModel:
         linear, spans, own, differences = np.split(
             weights, np.cumsum([1 + static.n_differences, N_SPANS, static.n_disturbances])
         )
-        disturbance = slopes.change(own, changes, velocity, passed, moved)
-        disturbance += np.diff(slopes.change(differences, changes, velocity, passed, moved), axis=0, prepend=0.0)
+        disturbance = slopes.change(own, velocity, passed, moved)
+        disturbance += np.diff(slopes.change(differences, velocity, passed, moved), axis=0, prepend=0.0)
         drive, _ = discrete.forced_response(discrete.rest(changes.shape[1]), disturbance)
         difference = passed
         for weight in linear:
@@ -234,13 +222,8 @@ def slopes_of(
         )
         of_velocity = (static.own_at(start + x, v_d + half) - static.own_at(start + x, v_d - half)) / (2.0 * half)
     damping = 2.0 * np.abs(static.damped_velocity(state, x_pb, x))
-    distances, stops = static.distances(velocity_scale), static.stops(state, x_d, velocity_scale)
-    places = np.arange(1, len(x_d) + 1)[:, None]
-    at_stop = np.maximum.accumulate(np.where(np.abs(stops) < _AT_STOP * distances, 0, places))
     return DisturbanceSlopes(
         friction,
-        1.0 / distances,
-        at_stop,
         2.0 * np.abs(x),
         damping,
         np.hstack([np.empty((len(x), 0)), *of_position]),

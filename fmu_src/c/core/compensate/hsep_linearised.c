@@ -31,8 +31,6 @@ HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_pre
     self->preview = parameters->horizon;
     self->count = hsep_disturbances_count(parameters);
     self->slopes = hsep_take(&end, n * (hsep_real)self->count);
-    self->at_stop = hsep_take(&end, n * HSEP_FEATURES_N_STOPS);
-    self->stops = hsep_take(&end, 2.0 * HSEP_FEATURES_N_STOPS * HSEP_N_REGRESSIONS);
     self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_N_REGRESSIONS);
     self->shrink = hsep_take(&end, n * HSEP_N_REGRESSIONS);
     self->commands = hsep_take(&end, 1.0 + preview);
@@ -63,16 +61,10 @@ static hsep_int linearised_first(const hsep_linearised *self, const hsep_average
 
 /* Gains of an expert, (n,) each, from a change of v_d, x and v to its prediction: of friction, position and damping and
  * of their differences, as filters of v_d and x alone. weights: of the disturbances, then of their differences. */
-static void linearised_gains(
-    hsep_linearised *self, const hsep_real weights[], hsep_real T_s, hsep_real gains[], hsep_real stops[])
+static void linearised_gains(hsep_linearised *self, const hsep_real weights[], hsep_real T_s, hsep_real gains[])
 {
     const hsep_real *slopes = hsep_at_const(self, self->slopes);
     const hsep_int n = self->n;
-    for (hsep_int i = 0; i < HSEP_FEATURES_N_STOPS; i++) {
-        const hsep_int at = HSEP_FEATURES_N_FRICTION + i;
-        stops[i] = weights[at] * slopes[at];
-        stops[HSEP_FEATURES_N_STOPS + i] = weights[self->count + at] * slopes[at];
-    }
     hsep_real *now = gains, *before = gains + n, *x_now = gains + 2 * n, *x_before = gains + 3 * n;
     hsep_real *x_earlier = gains + 4 * n, last[3] = {0.0}; /* of the differences, at the sample before */
     for (hsep_int k = 0; k < n; k++, slopes += self->count) {
@@ -163,9 +155,8 @@ static void linearised_of_increments(
     }
 }
 
-/* Slopes are (n, count), sample after sample: of each friction with the commanded velocity, s/m, of each stop operator
- * with the command since it was at its stop, 1/m, of the stiffness with the position, m, of the damping with its
- * velocity, m/s, and of what repeats with the position, 1/m. */
+/* Slopes are (n, count), sample after sample: of each friction with the commanded velocity, s/m, of the stiffness with
+ * the position, m, of the damping with its velocity, m/s, and of what repeats with the position, 1/m. */
 static void linearised_slopes(
     hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
 {
@@ -173,25 +164,13 @@ static void linearised_slopes(
     const hsep_real scale = model->forecast_scale, half = reach * scale, *x = hsep_at(model, model->x);
     hsep_real last = disturbances->before.x_d, *slopes = hsep_at(self, self->slopes);
     hsep_real spread[HSEP_FEATURES_N_FRICTION], steepest[HSEP_FEATURES_N_FRICTION];
-    hsep_real stops[HSEP_FEATURES_N_STOPS], distances[HSEP_FEATURES_N_STOPS];
-    hsep_int last_at[HSEP_FEATURES_N_STOPS] = {0}, *at_stop = hsep_part(self, self->at_stop);
-    for (hsep_int i = 0; i < HSEP_FEATURES_N_STOPS; i++) {
-        stops[i] = disturbances->before.stops[i];
-        distances[i] = hsep_disturbances_spread(scale, HSEP_FEATURES_N_FRICTION + i);
-    }
     for (hsep_int i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
         spread[i] = hsep_disturbances_spread(scale, i);
         steepest[i] = half > 0.0 ? hsep_tanh(2.0 * half / spread[i]) / (2.0 * half) : 1.0 / spread[i];
     }
     for (hsep_int j = self->n; j-- > 0; slopes += self->count) {
-        const hsep_real step = x_d[j] - last, v_d = step / disturbances->T_s;
+        const hsep_real v_d = (x_d[j] - last) / disturbances->T_s;
         last = x_d[j];
-        for (hsep_int i = 0; i < HSEP_FEATURES_N_STOPS; i++) {
-            stops[i] = hsep_clip(stops[i] + step, distances[i]);
-            last_at[i] = hsep_fabs(stops[i]) < HSEP_NEWTON_AT_STOP * distances[i] ? last_at[i] : self->n - j;
-            slopes[HSEP_FEATURES_N_FRICTION + i] = 1.0 / distances[i];
-            *at_stop++ = last_at[i];
-        }
         for (hsep_int i = 0; i < HSEP_FEATURES_N_FRICTION; i++) {
             /* tanh a - tanh b = tanh(a - b) (1 - tanh a tanh b), which cancels nothing where a and b are close */
             const hsep_real sign = hsep_tanh((v_d + half) / spread[i]);
@@ -261,33 +240,7 @@ HSEP_API void hsep_linearised_at(
         if (of_model > 0.0) {
             linearised_gains(
                 self, hsep_expert_weights(expert) + first, hsep_averaged_disturbances(model)->T_s,
-                hsep_at(self, self->gains) + i * LINEARISED_GAINS * n,
-                hsep_at(self, self->stops) + 2 * HSEP_FEATURES_N_STOPS * i);
-        }
-    }
-}
-
-/* Add what stop operators make of a change: it counts from where they were at their stops on. */
-static void linearised_add_stops(hsep_linearised *self, hsep_int i, hsep_int first, hsep_int c)
-{
-    const hsep_int count = self->preview - first, begin = self->n - count;
-    const hsep_real *commands = hsep_at(self, self->commands);
-    const hsep_real *own = hsep_at(self, self->stops) + 2 * HSEP_FEATURES_N_STOPS * i;
-    const hsep_real *difference = own + HSEP_FEATURES_N_STOPS;
-    const hsep_int *at_stop = hsep_part(self, self->at_stop + HSEP_FEATURES_N_STOPS * begin);
-    hsep_real *to = hsep_at(self, self->disturbance) + c, before = 0.0;
-    for (hsep_int u = 0; u < count; u++, at_stop += HSEP_FEATURES_N_STOPS, to += HSEP_PHYSICS_ABREAST) {
-        hsep_real sum = 0.0, now = 0.0, moved = 0.0;
-        for (hsep_int l = 0; l < HSEP_FEATURES_N_STOPS; l++) {
-            const hsep_real since = commands[1 + u] - commands[at_stop[l] > begin ? at_stop[l] - begin : 0];
-            sum += own[l] * since;
-            now += difference[l] * since;
-            moved += hsep_fabs(since);
-        }
-        *to += sum + (now - before);
-        before = now;
-        if (u > self->moves && !(moved > 0.0)) {
-            return; /* they are at their stops behind the change, or it began after that */
+                hsep_at(self, self->gains) + i * LINEARISED_GAINS * n);
         }
     }
 }
@@ -307,7 +260,6 @@ static void linearised_disturbance(hsep_linearised *self, hsep_int i, hsep_int f
     for (hsep_int u = 0; u < moves; u++) {
         to[HSEP_PHYSICS_ABREAST * u] += gains[u] * v_d[u] + gains[n + u] * v_1[u];
     }
-    linearised_add_stops(self, i, first, c);
 }
 
 /* The weights of the lags of an expert, each of them as often as a vector has lanes, and zeros behind them. */

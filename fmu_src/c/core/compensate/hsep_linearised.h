@@ -1,8 +1,8 @@
 /* Linearisation of the residual model with averaging (online model averaging) in the commands, over a preview.
  *
  * Disturbances are not affine in the commands, so a plan uses their slope at given commands, which is sech^2(v / v_i)
- * for friction, 1 / r_i for a stop operator off its stop, and 2 |x| for stiffness. The weights of the experts and of
- * the stack, and the shrinking by the variance, are held constant:
+ * for friction, and 2 |x| for stiffness. Stop operators, the weights of the experts and of the stack, and the shrinking
+ * by the variance, are held constant:
  *
  *   dx_h = (1 - pi_A) G_pb + pi_L df_L + pi_S df_S + pi_A dx_A
  *
@@ -22,9 +22,6 @@ typedef struct {
     /* Oldest first; of experts: of all that rows train, one after the other; abreast: HSEP_PHYSICS_ABREAST columns side
      * by side, sample after sample */
     hsep_int slopes;      /* (n, count) slopes of the disturbances, sample after sample */
-    hsep_int at_stop;     /* (n, HSEP_FEATURES_N_STOPS) hsep_int, last sample at which a stop operator was at its stop,
-                           * counted from 1; 0: before all of them */
-    hsep_int stops;       /* (2, HSEP_FEATURES_N_STOPS) of experts: gains of stop operators and their differences */
     hsep_int gains;       /* (5, n) of experts: gains of disturbances and their differences, from v_d now and a sample
                            * before, from x now and in the two samples before */
     hsep_int shrink;      /* (n,) of experts: share of each one in the stack */
@@ -40,7 +37,7 @@ typedef struct {
     hsep_int physics;     /* G_pb at rest, */
     hsep_int filters;     /* and of each column */
 } hsep_linearised;
-HSEP_ASSERT_WORDS(hsep_linearised, 20);
+HSEP_ASSERT_WORDS(hsep_linearised, 18);
 
 HSEP_API hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_predictor_parameters *parameters);
 HSEP_API void hsep_linearised_init(hsep_linearised *self, const hsep_predictor_parameters *parameters);

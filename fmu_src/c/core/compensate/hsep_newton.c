@@ -423,7 +423,7 @@ static newton_work newton_work_of(const hsep_newton *self, const hsep_newton_tas
             work.sample += 2.0 * m + all + 3.0 * NEWTON_NUMBER; /* with the variances before it */
             work.row += 0.5 * m * (m + NEWTON_NUMBER);
             if (hsep_averaged_kind_of(task->model, i) == HSEP_MODEL_RESIDUAL && task->model->shares[i] > 0.0) {
-                work.column += 0.7 * (hsep_real)expert->p + modes + 16.0 + HSEP_FEATURES_N_STOPS; /* early: less p */
+                work.column += 0.7 * (hsep_real)expert->p + modes + 16.0; /* early: less p */
             }
         }
     }
@@ -431,7 +431,7 @@ static newton_work newton_work_of(const hsep_newton *self, const hsep_newton_tas
     work.commands = all * NEWTON_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
                     all * modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
     work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
-    work.linearise = all * NEWTON_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 14.0);
+    work.linearise = all * NEWTON_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + 14.0);
     work.open = 20.0 * work.number + 5.0 * pairs;
     /* row, bound, slack, multiplier of each order */
     work.solve = 5.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.5);

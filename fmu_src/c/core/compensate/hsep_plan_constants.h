@@ -21,7 +21,6 @@
 #define HSEP_QP_MOVES 1e-12
 
 /* hybridsep/compensate/newton.py */
-#define HSEP_NEWTON_AT_STOP 0.999999
 #define HSEP_NEWTON_APART 4
 #define HSEP_NEWTON_TOLERANCE 0.0001, 0.01, 1e-05, 5, 100.0
 #define HSEP_NEWTON_FIRST_REACH 0.1
