@@ -61,7 +61,7 @@ class SepCompensator:
     """
 
     _SAVED = ("lead_in", "_state_before", "monitor", "_previous_plan", "_last_stop", "_delta_before", "_x_d_before")
-    _SAVED_OF_PLANNING = ("paused", "pause", "ahead", "share", "corrected", "reach")
+    _SAVED_OF_PLANNING = ("ahead", "share", "corrected", "reach")
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
         check_kind(HybridPredictor, predictor=predictor)
@@ -97,7 +97,7 @@ class SepCompensator:
         predictor.restart(start, t_init=t_init + lead_in * predictor.T_s if t_init > 0 else 0.0)
         self.lead_in = int(lead_in)
         self._state_before = min(self.compensate, SepState.PHYSICS)
-        self._planning.restart(predictor.T_s)
+        self._planning.restart()
         n_lost = samples_before(self.settings.measurement_timeout, self.T_s)
         self.monitor = Monitor(n_lost, self.settings.following_error_max)
         # Coefficients of the remainder of the last plan; last values of δ and of x_d
@@ -198,9 +198,7 @@ class SepCompensator:
         reach = self._planning.reach if chosen.reach is None else chosen.reach
         if chosen.share is not None:
             share, correction = chosen.share, chosen.coefficients - self._previous_plan
-        self._pending = PendingPlan(
-            *(coefficients, delta, now, stop, chosen.state, chosen.runs_away, share, correction, reach)
-        )
+        self._pending = PendingPlan(coefficients, delta, now, stop, chosen.state, share, correction, reach)
         as_published(prediction.x_pb, "x_pb")
         x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state)
         return PublishedWindow(
@@ -271,7 +269,7 @@ class SepCompensator:
             compensator.predictor = kept  # the constructor has restarted the other one
             nothing = np.zeros(compensator.predictor.Np)
             plan, stop = compensator._previous_plan, compensator._last_stop
-            pending = PendingPlan(plan, nothing, nothing, stop, SepState.OFF, False, 1.0, plan, 0.0)
+            pending = PendingPlan(plan, nothing, nothing, stop, SepState.OFF, 1.0, plan, 0.0)
             like = compensator._saved(), pending if meta["is_planned"] else ()
             saved, found = restored(like, arrays)
             for (owner, name), value in zip(compensator._owners(), saved, strict=True):

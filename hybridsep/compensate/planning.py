@@ -1,9 +1,8 @@
 """Planning: how the plan of a window is chosen and published, with the paper's model and with the averaged one.
 
 With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. The averaged one, as
-soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan. Where its
-own plan runs away, it plans none for a time, and one that ends compensation is judged in place of the remainder; that
-is followed, too, where compensation is switched off, or has tripped. It weighs its experts by their errors in the
+soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan. Where
+compensation is switched off, or has tripped, a plan ends it. It weighs its experts by their errors in the
 window and half a plan ahead, so that the expert of the next 20 ms does not plan what comes after them. Of what its own
 plan changes a share is taken: less where it takes back what the last one has changed, or gains little beside the
 variance of predictions. A motion faster than all of its run is compensated with half of the largest change at most.
@@ -43,7 +42,6 @@ class PendingPlan:
     x_d: Array
     stop: Array  # (n,), m: coefficients of its stop, where the plan is longer than the preview
     state: SepState  # model of the plan
-    runs_away: bool  # whether the residual model's plan ran away, so that it plans none for a time
     share: float  # of the residual model's change of the last plan that is taken, but for what it doubts
     correction: Array  # (3 + n_free,), m: what is taken, before a stop shortens the plan; 0 of any other plan
     reach: float  # of friction's slope in the next Newton step
@@ -69,7 +67,6 @@ class ChosenPlan(NamedTuple):
     state: SepState  # model that planned it
     coefficients: Array  # (3 + n_free,), m
     scales: FeatureScales | None  # of the residual model's features
-    runs_away: bool = False  # whether the residual model's plan ran away
     share: float | None = None  # as :class:`PendingPlan` has it, if the residual model planned
     reach: float | None = None  # likewise, if a Newton step was made
 
@@ -88,8 +85,6 @@ class Planning(ABC):
 
     PINNED: ClassVar[int]  # leading samples of a window in which a bounded plan, or any change of the last, follows it
     SOLVED: ClassVar[Tolerance]  # to which programmes are solved
-    paused: int  # windows that the residual model does not plan now
-    pause: int  # and after its next plan that runs away
     # shape (n_ahead, n_experts, Np), in m: entry i is what is stacked for the i-th window from this one, by the plan of
     # half a plan before it, the last one by this window's; NaN where nothing is known; with the paper's model none
     ahead: Array
@@ -104,9 +99,8 @@ class Planning(ABC):
         # (n_free, m): splines that a plan changes the last one by, none of them pinned; without it all at once
         self.splines: Array | None = None
 
-    def restart(self, T_s: float) -> None:
-        """Begin another run, with a sampling interval in s: nothing is paused."""
-        self.paused, self.pause = 0, max(1, int(RETRY / (self.Np * T_s) + 0.5))  # rounded as in C
+    def restart(self) -> None:
+        """Begin another run: nothing was planned."""
         self.ahead = np.empty((0, 0, self.Np))
         self.share, self.corrected = 1.0, np.zeros(N_DECIDED + self.basis.n_free)
         self.reach = FIRST_REACH
@@ -117,10 +111,6 @@ class Planning(ABC):
         self.share, self.corrected = plan.share, np.concatenate((plan.correction[kept:], np.zeros(kept)))
         self.reach = plan.reach
         self.ahead = np.concatenate((self.ahead[1:], np.full_like(self.ahead[:1], np.nan)))
-        if plan.runs_away:
-            self.paused, self.pause = self.pause, 2 * self.pause
-        else:
-            self.paused = max(0, self.paused - 1)
 
     @property
     def due(self) -> Array | None:
@@ -241,14 +231,6 @@ def has_stable_poles(w_e: Array) -> bool:
     return True
 
 
-_AT_BOUND, _BOUND_SHARE, _LEFT = 0.97, 0.2, 0.3
-"""A plan is at its bound where its change is this share of the largest change. It may be there longer than the physics
-model's plan by this share of a window, and may leave this RMS error then, relative to the largest change."""
-
-RETRY = 0.5
-"""Time for which the averaged model plans nothing after the first of its plans that ran away, s; twice as long after
-each further one of a run."""
-
 FASTER, _UNPROVEN = 1.25, 0.5
 """Speed of the preview, relative to the fastest motion that was learned, above which plans may change the command by
 this share of ``change_max`` only. ``change_max`` is to be twice the largest error without compensation, so this is that
@@ -271,21 +253,6 @@ _PINNED_AVERAGED = 24
 model."""
 
 
-def runs_away(delta: Array, of_physics: Array, error: float, change_max: float | None) -> bool:
-    """Return whether a plan asks for a larger change than compensation is made for: its model is wrong then.
-
-    A motor at its limit does not follow, so that the next plan asks for more. A position loop that is driven so far may
-    fall into a second state with an error many times larger, and stays in it when compensation ends.
-
-    ``delta``, ``of_physics``: (Np,), m: changes of the command by the plan, and by the physics model's; ``error``: m:
-    RMS error that the plan leaves, by its own model; ``change_max``: m: largest change of the command.
-    """
-    if change_max is None:
-        return False
-    shares = [float(np.mean(np.abs(change) > _AT_BOUND * change_max)) for change in (delta, of_physics)]
-    return error > _LEFT * change_max and shares[0] - shares[1] > _BOUND_SHARE
-
-
 class AveragedPlanning(Planning):
     """Plans with the averaged model, which watches itself."""
 
@@ -302,9 +269,9 @@ class AveragedPlanning(Planning):
         free = solved_splines(n, Np // self.spacing if self.horizon == settings.preview else n)
         self.splines = np.concatenate((np.zeros((self.n_pinned, free.shape[1])), free))
 
-    def restart(self, T_s: float) -> None:
-        """Begin another run: nothing is paused, and nothing was planned."""
-        super().restart(T_s)
+    def restart(self) -> None:
+        """Begin another run: nothing was planned."""
+        super().restart()
         self.ahead = np.full((max(1, self.horizon // (2 * self.Np)), len(EXPERTS), self.Np), np.nan)
 
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
@@ -324,7 +291,7 @@ class AveragedPlanning(Planning):
         change = _UNPROVEN if model.outgrows(FASTER) else 1.0
         of_physics_change = 1.0 if model.is_trained else change
         has_learned = predictor.k >= predictor.n_init and model.has_learned
-        follows = has_learned and most is SepState.HYBRID and not self.paused
+        follows = has_learned and most is SepState.HYBRID
         tolerance = TOLERANCE._replace(steps=PHYSICS_STEPS) if follows else TOLERANCE
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
         bounds = self.limits(preview, may_turn=most is SepState.PHYSICS, change=of_physics_change)
@@ -340,10 +307,8 @@ class AveragedPlanning(Planning):
             assert self.splines is not None
             jerk_weight = self.settings.jerk_weight
             planner = AveragedPlanner(self.basis, self.splines, jerk_weight, model, path, preview.delta_before)
-            ends = bool(self.paused) and most is SepState.HYBRID
-            known = None if ends else model.of_previous_plan
-            last = planner.point(self.ending(preview) if ends else previous_plan, prediction=known)
-            of_physics, is_away, reach = planner.point(physics), False, None
+            last = planner.point(previous_plan, prediction=model.of_previous_plan)
+            of_physics, reach = planner.point(physics), None
             if follows:
                 hybrid, reach = last, self.reach
                 for _ in range(self.n_steps):
@@ -351,19 +316,15 @@ class AveragedPlanning(Planning):
                     bounds = self.limits(before, may_turn=True, change=change)
                     hybrid, reach = planner.step(hybrid, bounds, self.basis.filtered(g), reach)
                 if is_better(hybrid.cost, of_physics.cost):
-                    values, error = self.basis.values[: self.Np], math.sqrt(hybrid.cost / self.horizon)
-                    deltas = values @ hybrid.coefficients, values @ physics
-                    is_away = runs_away(*deltas, error, self.settings.change_max)
-                    if not is_away:
-                        step, gain = hybrid.coefficients - previous_plan, last.cost - hybrid.cost
-                        share = self._share_of(step)
-                        doubt = float(self.basis.weight**2 @ last.prediction.variance[-self.horizon :])
-                        left = 1.0 / (1.0 + _DOUBT * doubt / gain) if gain > 0.0 else 0.0
-                        step *= share * left if left > 0.0 else 0.0  # not NaN
-                        return ChosenPlan(SepState.HYBRID, previous_plan + step, scales, share=share, reach=reach)
+                    step, gain = hybrid.coefficients - previous_plan, last.cost - hybrid.cost
+                    share = self._share_of(step)
+                    doubt = float(self.basis.weight**2 @ last.prediction.variance[-self.horizon :])
+                    left = 1.0 / (1.0 + _DOUBT * doubt / gain) if gain > 0.0 else 0.0
+                    step *= share * left if left > 0.0 else 0.0  # not NaN
+                    return ChosenPlan(SepState.HYBRID, previous_plan + step, scales, share=share, reach=reach)
             if is_better(last.cost, of_physics.cost):
-                return ChosenPlan(SepState.OFF, last.coefficients, scales, is_away, reach=reach)
-        return ChosenPlan(SepState.PHYSICS, physics, scales, is_away, reach=reach)
+                return ChosenPlan(SepState.OFF, last.coefficients, scales, reach=reach)
+        return ChosenPlan(SepState.PHYSICS, physics, scales, reach=reach)
 
     def _share_of(self, change: Array) -> float:
         """Return which share of a change of the last plan, ``(3 + n_free,)``, m, is taken."""

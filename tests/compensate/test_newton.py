@@ -1,7 +1,6 @@
 """Compensation with the averaged model: its slope, what a plan gains, and what it must survive."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -19,7 +18,7 @@ from hybridsep.base.signals import Array
 from hybridsep.compensate import newton
 from hybridsep.compensate.compensator import SepCompensator
 from hybridsep.compensate.newton import AveragedPlanner, PlanModel
-from hybridsep.compensate.planning import RETRY, AveragedPlanning, ChosenPlan, runs_away
+from hybridsep.compensate.planning import AveragedPlanning, ChosenPlan
 from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.cosim.run import Run
@@ -229,67 +228,6 @@ def test_where_no_length_of_a_step_is_better_the_next_one_looks_farther(monkeypa
     monkeypatch.setattr(newton, "is_better", lambda *_: False)
     run(sep)
     assert sep._planning.reach >= 1.0
-
-
-def no_faster(velocity: float) -> Callable[[int, float], float]:
-    """Return the sensor of a drive whose motor does not go beyond a velocity, m/s."""
-    last = 0.0
-
-    def sensed(k: int, x_meas: float) -> float:
-        nonlocal last
-        last += min(max(x_meas - last, -velocity * TS), velocity * TS)
-        return last
-
-    return sensed
-
-
-@pytest.mark.slow
-def test_a_plan_that_runs_away_ends_the_hybrids_plans_for_a_time_that_doubles(monkeypatch: pytest.MonkeyPatch) -> None:
-    chosen: list[tuple[int, ChosenPlan]] = []
-    choose = AveragedPlanning.choose
-
-    def recorded(self: AveragedPlanning, *arguments: Any) -> ChosenPlan:
-        plan = choose(self, *arguments)
-        chosen.append((self.paused, plan))
-        return plan
-
-    sep = SepCompensator.from_bytes(learned())
-    monkeypatch.setattr(AveragedPlanning, "choose", recorded)
-    sep.change(change_max=1.2e-4)
-    run(sep, sensor=no_faster(0.025), t_init=0.0)
-    away = [i for i, (_, plan) in enumerate(chosen) if plan.runs_away]
-    pause = round(RETRY / (50 * TS))
-    assert [chosen[i + 1][0] for i in away] == [pause, 2 * pause]
-    assert all(plan.state is not SepState.HYBRID for paused, plan in chosen if paused > 0)
-    restored = SepCompensator.from_bytes(sep.to_bytes())
-    for one in (sep, restored):
-        assert one.plan(np.full(200, 0.007)).state is not SepState.HYBRID
-    assert chosen[-2][0] == chosen[-1][0] > 0
-    sep.restart(0.0)  # another run
-    sep.plan(moves()[:200])
-    assert chosen[-1][0] == 0
-    free = SepCompensator.from_bytes(learned())
-    free.change(change_max=None)  # no bound, no plan at it
-    chosen.clear()
-    run(free, sensor=no_faster(0.03), t_init=0.0)
-    assert not any(plan.runs_away for _, plan in chosen)
-    assert all(plan.state is SepState.HYBRID for _, plan in chosen[away[0] :])
-
-
-@pytest.mark.parametrize(
-    ("at_bound", "of_physics", "error", "expected"),
-    [
-        (30, 0, 4e-5, True),
-        (20, 0, 4e-5, False),  # a fifth of the window
-        (60, 45, 4e-5, False),  # as long as the physics model's
-        (30, 0, 2e-5, False),  # it pays
-        (100, 0, math.nan, False),
-    ],
-)
-def test_a_plan_runs_away_at_its_bound(at_bound: int, of_physics: int, error: float, expected: bool) -> None:
-    delta, other = np.zeros(100), np.zeros(100)
-    delta[:at_bound], other[:of_physics] = -1e-4, 0.98e-4
-    assert runs_away(delta, other, error, 1e-4) is expected
 
 
 @pytest.mark.slow

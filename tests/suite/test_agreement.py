@@ -232,24 +232,6 @@ def test_faulty_measurements_are_compensated_as_by_the_library(new_stream: Strea
     assert 50 < loop.column(COMPENSATOR, "n_rejected")[-1] < 500
 
 
-def slow(k: int, x_meas: float, last: float) -> float:
-    return last + min(max(x_meas - last, -4e-5), 4e-5)  # a motor that does not get beyond 40 of 80 mm/s
-
-
-@pytest.mark.slow
-@on_all((COMPENSATOR,), needs="agreement")
-def test_a_plan_that_runs_away_ends_the_hybrids_plans(new_stream: StreamMaker) -> None:
-    values: dict[str, Value] = {"p": 10, "change_max": 8e-4, "recall": 0}
-    loop = assert_agreement(new_stream, 900, values, 1e-8, sensor=slow)
-    state = loop.column(COMPENSATOR, "sep_state")
-    planned = np.flatnonzero(state == 2.0)
-    ends = planned[0] + int(np.argmin(state[planned[0] :] == 2.0))
-    assert 0 < ends - planned[0] <= 100
-    assert (state[ends : ends + 400] != 2.0).all()  # half a second less the window whose plan ran away
-    sound = closed_loop(new_stream.model, 900, values).column(COMPENSATOR, "sep_state")
-    assert (sound[planned[0] :] == 2.0).all()
-
-
 def growing(k: int, x_meas: float, last: float) -> float:
     return x_meas + (1e-6 * 1.1 ** (k - 250) if 250 <= k < 300 else 0.0)
 

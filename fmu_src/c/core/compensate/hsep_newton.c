@@ -241,8 +241,6 @@ HSEP_API void hsep_newton_init(
     hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[])
 {
     (void)hsep_newton_lay_out(self, parameters);
-    const hsep_real window = (hsep_real)self->Np * parameters->settings.T_s; /* s */
-    self->pause = (hsep_int)hsep_fmax(1.0, HSEP_PLANNING_RETRY / window + 0.5);
     self->share = 1.0;
     self->reach = HSEP_NEWTON_FIRST_REACH;
     hsep_linearised_init(hsep_part(self, self->linearised), parameters);
@@ -315,18 +313,6 @@ static void newton_judge(hsep_newton *self, const hsep_newton_task *task)
     }
 }
 
-/* Whether the best plan asks for a larger change than compensation is made for. A motor at its limit does not follow,
- * so that the next plan asks for more. A position loop that is driven so far may fall into a second state with an error
- * many times larger, and stays in it when compensation ends. */
-static int newton_runs_away(const hsep_newton *self, const hsep_newton_task *task)
-{
-    const hsep_real share = hsep_planner_splines(task->planner)->share[0];
-    const hsep_real error = hsep_sqrt(self->cost / (hsep_real)self->preview) * share;
-    const hsep_real longer = hsep_planner_at_bound(task->planner, hsep_at_const(self, self->best)) -
-                             hsep_planner_at_bound(task->planner, hsep_at_const(self, self->of_physics));
-    return error > HSEP_PLANNING_LEFT && longer > HSEP_PLANNING_BOUND_SHARE;
-}
-
 /* Forget what the last plan changed but for what is in its remainder, which this plan may change. */
 static void newton_shift(hsep_newton *self, hsep_int kept)
 {
@@ -372,16 +358,10 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     hsep_int plan = is_last ? self->rest : self->of_physics;
     self->planned = !is_last;
     if (self->follows && newton_better(self->cost, of_physics)) {
-        if (newton_runs_away(self, task)) {
-            self->paused = self->pause;
-            self->pause *= 2;
-        } else {
-            newton_take(self, task->planner);
-            plan = self->best;
-            self->planned = 2;
-        }
-    }
-    if (self->planned < 2) {
+        newton_take(self, task->planner);
+        plan = self->best;
+        self->planned = 2;
+    } else {
         hsep_zero(hsep_at(self, self->corrected), self->n);
     }
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
@@ -502,7 +482,7 @@ static hsep_real newton_left(hsep_newton *self, const hsep_newton_task *task, co
         left += work->open + work->solve + (hsep_real)newton_physics_steps(self) * parts;
     }
     if (self->ends) {
-        left += work->open + work->solve + 2.0 * work->predict + (hsep_real)newton_tolerance.steps * parts;
+        left += work->open + work->solve + (hsep_real)newton_tolerance.steps * parts;
     }
     if (self->follows) {
         hsep_real newton = work->linearise + newton_of_products(self, 0, self->m) + work->solve +
@@ -571,19 +551,13 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->follows = self->follows && self->planned;
         newton_shift(self, self->Np / hsep_planner_splines(planner)->spacing);
 
-        /* In place of the remainder of the last plan one that ends compensation, where it is off or pauses */
+        /* In place of the remainder of the last plan one that ends compensation, where it is off */
         self->cost_of_rest = self->cost;
         if (self->ends) {
             newton_copy(self, c, rest);
             NEWTON_YIELD(4, work.open);
             hsep_planner_end(planner, task->x_d);
             NEWTON_SOLVE(5, newton_tolerance.steps)
-            newton_copy(self, rest, c);
-        }
-        if (self->ends && self->judges) {
-            self->samples = 0;
-            NEWTON_PREDICT(6, all, rest, 0)
-            self->cost_of_rest = newton_cost(self, task, rest);
         }
 
         /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
@@ -701,9 +675,8 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
     self->planned = best > 0;
     self->is_physics = best == 1;
     self->judges = self->planned && (hsep_real)predictor->k >= predictor->n_init && task->model->predicted[HSEP_STATIC];
-    self->follows = self->judges && best > 1 && self->paused == 0;
-    self->ends = (best == 0 && was_planned > 0) || (self->judges && best > 1 && self->paused > 0);
-    self->paused -= self->paused > 0;
+    self->follows = self->judges && best > 1;
+    self->ends = best == 0 && was_planned > 0;
     hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), 0); /* work follows from shares */
     const newton_work work = newton_work_of(self, task);
     /* This sample has cost that; what is learned at the end of the last window costs as much as commands of a plan */

@@ -4,9 +4,7 @@
  * delta. Each of one or two Gauss-Newton steps solves the quadratic programme of the model linearised at the best plan
  * so far, friction over what the step before changed, and goes to its minimum if that lowers the cost. Once it has
  * learned, the averaged model judges all plans: its own, the physics model's, and the remainder of the last one; the
- * best is taken, of its own change of the last one a share. Where its own asks for a larger change than compensation is
- * made for, it is wrong, and plans none for a time, which doubles; a plan that ends compensation stands for the
- * remainder then, and is followed where compensation is off.
+ * best is taken, of its own change of the last one a share. Where compensation is off a plan ends it.
  *
  * A plan is one function in reading order, cut by yields into short parts, each of which says what it costs;
  * hsep_newton_run does as many as a sample's equal share of the work that may be left.
@@ -34,7 +32,7 @@ typedef struct {
     hsep_int is_physics;    /* whether no better model than the physics model is allowed */
     hsep_int judges;        /* whether the averaged model judges plans, */
     hsep_int follows;       /* and whether it may plan */
-    hsep_int ends;          /* whether a plan that ends compensation stands for the remainder of the last one */
+    hsep_int ends;          /* whether a plan that ends compensation is made */
     hsep_int n_steps;       /* Newton steps of a plan, */
     hsep_int steps;         /* those done, */
     hsep_int gains;         /* whether the last one lowered the cost, */
@@ -45,11 +43,9 @@ typedef struct {
     hsep_int spline;        /* splines whose change of x_h, or row of the programme, is computed */
     hsep_int status;        /* hsep_plan_status of the programme that is being solved */
     hsep_int planned;       /* model of the plan: 0 none, 1 physics, 2 averaged */
-    hsep_int paused;        /* windows that the averaged model does not plan, now */
-    hsep_int pause;         /* and after the next of its plans that runs away */
     hsep_real cost;         /* m2, of the best plan so far, */
     hsep_real cost_of_rest; /* and of the remainder of the last plan */
-    hsep_real doubt;        /* m2, variance under the last plan's, weighted as errors; a plan that ends has none */
+    hsep_real doubt;        /* m2, variance under the last plan's, weighted as errors */
     hsep_real bound;        /* share of change_max that bounds the averaged model's plan */
     hsep_real share;        /* of its change of the last plan that was taken last, but for what it doubts */
     hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
@@ -72,7 +68,7 @@ typedef struct {
     hsep_int physics; /* G_pb at the beginning of the window, */
     hsep_int trial;   /* and for a trial */
 } hsep_newton;
-HSEP_ASSERT_WORDS(hsep_newton, 46);
+HSEP_ASSERT_WORDS(hsep_newton, 44);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {

@@ -241,17 +241,6 @@ HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c
     return self->jerk_weight * planner_third(self, c, HSEP_N_DECIDED + hsep_planner_splines(self)->n, work);
 }
 
-HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_real c[])
-{
-    const hsep_splines *splines = hsep_planner_splines(self);
-    hsep_real bounded = 0.0;
-    for (hsep_int k = 0; k < self->Np; k++) {
-        const hsep_real delta = hsep_splines_sum(splines, c, HSEP_N_DECIDED + splines->n, k);
-        bounded += hsep_fabs(delta) * splines->share[0] > HSEP_PLANNING_AT_BOUND;
-    }
-    return bounded / (hsep_real)self->Np;
-}
-
 /* The first spline that this cost is of. */
 static hsep_int planner_first(const hsep_planner *self) { return hsep_planner_splines(self)->n - self->solved.n; }
 

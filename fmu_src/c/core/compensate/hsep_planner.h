@@ -105,9 +105,8 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tole
 /* Do a part of a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
 HSEP_API int hsep_planner_advance(hsep_planner *self);
 
-/* Cost of the jerk of a plan, m2, work: (preview,); and share of a window in which it is at the bound of the change. */
+/* Cost of the jerk of a plan, m2, work: (preview,). */
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[]);
-HSEP_API hsep_real hsep_planner_at_bound(const hsep_planner *self, const hsep_real c[]);
 
 /* Shorten the plan, once it is made, to what keeps the limits whatever follows the known part of x_d, (preview,), m. */
 HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[]);
