@@ -55,7 +55,7 @@ def machine_of_drive(recipe: Recipe) -> Machine:
     T_s, hold, x_d, Np = recipe.axis.T_s, recipe.settings.input_hold, trajectory(recipe), recipe.settings.Np
     error = x_d - TwoMassDrive(recipe.axis, float(x_d[0])).run(x_d)
     velocity, acceleration, jerk = (spare * peak for spare, peak in zip(SPARE, peak_derivatives(x_d, T_s), strict=True))
-    window = CompensatorSettings().window(recipe.model.look_ahead(T_s, hold))
+    window = CompensatorSettings().window(recipe.model.look_ahead(T_s, hold), T_s)
     return machine_of(
         *(recipe.model, hold, T_s, "two_mass", f"Drive of two masses {recipe.index}"),
         predictor={"Np": Np, "p": min(50, Np, window)},

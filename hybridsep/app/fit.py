@@ -130,14 +130,14 @@ def _gains(text: str) -> dict[str, float]:
 
 
 def _seconds(text: str) -> float:
-    """Return the seconds of a time, ``60ms`` or ``0.06s``; ParameterError if it is none."""
-    number, factor = (text[:-2], 1e-3) if text.endswith("ms") else (text.removesuffix("s"), 1.0)
+    """Return the seconds of a time, ``60ms`` or ``0.06s``; ParameterError if it is none, or has no unit."""
+    number, factor = (text[:-2], 1e-3) if text.endswith("ms") else (text[:-1] if text.endswith("s") else "", 1.0)
     try:
         seconds = factor * float(number)
     except ValueError:
         seconds = math.nan
     if not 0.0 < seconds < math.inf:
-        raise ParameterError(f"--look-ahead must be a time such as 60ms or 0.06s, got {text!r}")
+        raise ParameterError(f"--look-ahead must be a time with its unit, such as 60ms or 0.06s, got {text!r}")
     return seconds
 
 

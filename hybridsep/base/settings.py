@@ -321,22 +321,36 @@ class CompensatorSettings(Settings):
         unless_given=None,
     )
 
-    def window(self, look_ahead: int) -> int:
+    def plan(self, look_ahead: int, T_s: float) -> int:
+        """Return the samples of a plan for a drive that needs ``look_ahead``, of ``T_s``, s.
+
+        A plan is back at the command at its end. Where the limits need more than half of it to take back the error of
+        an axis that lags, half of ``change_max``, it is longer by that, by as much as it is at most.
+        """
+        if self.limits is None or self.change_max is None:
+            return look_ahead
+        change, own = 0.5 * self.change_max, self.limits
+        fastest = change / own.velocity, 2 * math.sqrt(change / own.acceleration), math.cbrt(32 * change / own.jerk)
+        back = math.ceil(min(max(fastest) / T_s, look_ahead))
+        most = int(self.parameters()["horizon"].maximum)
+        return min(look_ahead + back, most) if 2 * back > look_ahead else look_ahead
+
+    def window(self, look_ahead: int, T_s: float) -> int:
         """Return the samples of a window: a tenth of the preview, which is ``look_ahead`` samples if left out.
 
         It is a multiple of ``spacing``, and at least 20, a tenth of what the drive needs or a third of a short preview,
         whichever is least: a controller plans in half of it, and its lags serve a predictor with longer windows, too.
         """
-        preview, spacing = self.preview or look_ahead, self.spacing or self._spacing(look_ahead)
+        preview, spacing = self.preview or look_ahead, self.spacing or self._spacing(look_ahead, T_s)
         most = max(1, (preview - 4 * spacing - PLAN_END) // spacing)
         return spacing * min(most, math.ceil(max(min(20, look_ahead / 10, preview / 3), preview / 10) / spacing))
 
-    def _spacing(self, look_ahead: int) -> int:
+    def _spacing(self, look_ahead: int, T_s: float) -> int:
         """Return a hundredth of a plan, or a twentieth of a preview that is much shorter."""
         preview = self.preview or look_ahead
-        return max(1, min(round(max(preview, look_ahead) / 100), preview // 20))
+        return max(1, min(round(max(preview, self.plan(look_ahead, T_s)) / 100), preview // 20))
 
-    def for_window(self, Np: int, look_ahead: int) -> "CompensatorSettings":
+    def for_window(self, Np: int, look_ahead: int, T_s: float) -> "CompensatorSettings":
         """Return these settings for windows of ``Np`` samples, defaults filled in.
 
         A ``preview`` that is left out follows from ``look_ahead``, the samples that the drive needs.
@@ -345,7 +359,7 @@ class CompensatorSettings(Settings):
         """
         spacing, preview = self.spacing, self.preview
         if spacing is None:
-            most = self._spacing(look_ahead)
+            most = self._spacing(look_ahead, T_s)
             if preview is not None:
                 most = max(1, min(most, (preview - Np - PLAN_END) // 4))
             spacing = max(one for one in range(1, most + 1) if Np % one == 0)
@@ -362,7 +376,7 @@ class CompensatorSettings(Settings):
             raise ParameterError("; ".join(problems))
         # Behind the window, and what the next one leaves as it is, a stop has to fit into the preview
         fits = preview >= Np + Np // 2 + 5 * spacing + PLAN_END
-        horizon = min(look_ahead, _SPLINES * spacing) if self.horizon is None else self.horizon
+        horizon = min(self.plan(look_ahead, T_s), _SPLINES * spacing) if self.horizon is None else self.horizon
         return replace(self, spacing=spacing, preview=preview, horizon=max(preview, horizon if fits else 0))
 
 

@@ -70,7 +70,7 @@ class SepCompensator:
         predictor.settings.check_planning()
         self.predictor = predictor
         look_ahead = predictor.model.look_ahead(predictor.T_s, predictor.settings.input_hold)
-        self.settings = settings = (settings or CompensatorSettings()).for_window(Np, look_ahead)
+        self.settings = settings = (settings or CompensatorSettings()).for_window(Np, look_ahead, predictor.T_s)
         assert settings.preview is not None
         assert settings.spacing is not None
         assert settings.horizon is not None

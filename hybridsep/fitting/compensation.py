@@ -467,7 +467,7 @@ class Stretch:
             settings, Np = own, known.Np
             if preview != own.preview:
                 settings = replace(settings, preview=preview, spacing=None, horizon=None)
-                settings = settings.for_window(Np := settings.window(needed), needed)
+                settings = settings.for_window(Np := settings.window(needed, known.T_s), needed, known.T_s)
             found = self.expected(settings, Np)
             bound = limits_that_bind(found.x_d, found.x_dm, known.T_s, own)
             left, finer = rms(found.compensated), dict[str, Any](jerk_weight=_LIGHTER * settings.jerk_weight)

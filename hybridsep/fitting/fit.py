@@ -14,7 +14,7 @@ from ..base.errors import IdentificationError, ParameterError, SignalError, chec
 from ..base.files import as_path, plain, write_whole
 from ..base.metrics import html_table, line_plot
 from ..base.parameters import finite
-from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, CompensatorSettings, PredictorSettings
+from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, CompensatorSettings, Limits, PredictorSettings
 from ..base.signals import Array, as_samples, check_interval
 from ..base.threads import one_blas_thread
 from ..base.version import __version__
@@ -350,7 +350,10 @@ def fit(
     needed = model.look_ahead(T_s, default.input_hold)
     ahead = needed if ahead is None else ahead
     # A compensator has shorter windows, and what the predictor has learned is to serve it, too
-    most = CompensatorSettings(preview=ahead).window(needed)
+    limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
+    if given_limits:
+        limits.pop("estimated", None)
+    most = _compensation(ahead, limits).window(needed, T_s)
     if look_ahead is not None and p and max(p) > most:
         raise ParameterError(
             f"p must be at most {most}, the samples in a window of a compensator that looks {look_ahead:g} s ahead, "
@@ -363,9 +366,6 @@ def fit(
     replayed = replace(replayed, offset=found.offset).with_peers(stage("peers on the second half", 0.8, 0.9))
     progress("a plant to try with", 0.9)
     plant = identified_plant(model, settings, recordings, tried)
-    limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
-    if given_limits:
-        limits.pop("estimated", None)
     machine = _machine(name, logs, model, settings, ahead, plant.entries, limits)
     tracking = None
     if given_limits:
@@ -411,6 +411,12 @@ def _identified(
         return unit_gain_model(settings.T_s, f"{error}; a gain of 1 without lag is taken")
 
 
+def _compensation(look_ahead: int, limits: Mapping[str, Any]) -> CompensatorSettings:
+    """Return the settings that are given of a compensator, ``limits`` as in ``[drive_limits]``, if there are any."""
+    own = Limits(**{name: limits[name] for name in Limits.parameters()}) if limits else None
+    return CompensatorSettings(preview=look_ahead, limits=own, change_max=limits.get("change_max"))
+
+
 def _machine(
     name: str,
     logs: Sequence[Log],
@@ -425,12 +431,13 @@ def _machine(
     compensation = {"drive_limits": dict(limits)} if limits else {}
     known = {key: value for key in PredictorSettings.KNOWN if (value := getattr(settings, key))}
     if limits:  # as numbers, for whoever reads the file, and at least as many samples in a window as there are lags
-        given, needed = CompensatorSettings(preview=look_ahead), model.look_ahead(settings.T_s, settings.input_hold)
-        given = given.for_window(Np := given.window(needed), needed)
+        given, T_s = _compensation(look_ahead, limits), settings.T_s
+        needed = model.look_ahead(T_s, settings.input_hold)
+        given = given.for_window(Np := given.window(needed, T_s), needed, T_s)
         assert given.spacing is not None
         if settings.p > Np:
             Np = -(-settings.p // given.spacing) * given.spacing
-            given = replace(given, preview=None, horizon=None).for_window(Np, look_ahead)
+            given = replace(given, preview=None, horizon=None).for_window(Np, look_ahead, T_s)
         numbers = {"Np": Np, "preview": given.preview, "spacing": given.spacing}
         if given.horizon != given.preview:
             numbers["horizon"] = given.horizon

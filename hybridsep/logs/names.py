@@ -18,7 +18,7 @@ planned, that which enters the position loop, later and interpolated, the measur
 its deviation from the contour."""
 
 _NAMES: Mapping[str, tuple[str, ...]] = {
-    "t": ("t", "time", "timestamp", "time_stamp", "sec", "seconds", "zeit"),
+    "t": ("t", "time", "timestamp", "time_stamp", "sec", "seconds", "epoch", "zeit"),
     "x_d": (
         "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "set_point", "command",
         "commanded", "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "ctrl_pos",
@@ -33,9 +33,9 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 """Names of each role's column, by precedence, in small letters; where the true position is x, x_meas is meant."""
 
 _SOLL, _IST = {"sollposition", "solllage", "lagesollwert"}, {"istposition", "istlage", "lageistwert"}
-_COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "des", "desired", "target"}
+_COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "sp", "des", "desired", "target"}
 _COMMANDED |= {"soll", *_SOLL}
-_MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "ist"} | _IST
+_MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "pv", "ist"} | _IST
 _POSITION = {"pos", "position", "positions", "lage"} | _SOLL | _IST
 """Words within names, in small letters; what is left of a name beside them and the word axis is the axis."""
 
@@ -83,7 +83,8 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
             (commanded if kinds[0] else measured).setdefault(axis, name)
             if is_position:
                 whole["x_d" if kinds[0] else "x"].append(name)
-    measured = {**positions, **measured}
+    bare = {stated_unit(name)[0]: name for name in names}  # q beside q_des
+    measured = {**{axis: bare[axis] for axis in commanded if axis in bare}, **positions, **measured}
     found = {axis: (x_d, measured[axis]) for axis, x_d in commanded.items() if axis in measured}
     # A compensation is added to what enters the position loop; what was planned is another instant's
     found = {axis: (signals_of(names, x).get("loop_command", x_d), x) for axis, (x_d, x) in found.items()}

@@ -105,14 +105,14 @@ class Machine(FileSection):
         of the predictor's lags as fit into it.
         """
         own, predictor = self._compensator_entries(PredictorSettings), self.predictor_settings
-        Np = own.setdefault("Np", self._compensation().window(self.look_ahead))
+        Np = own.setdefault("Np", self._compensation().window(self.look_ahead, self.T_s))
         shorter = {"p": min(predictor.p, Np), "q": min(predictor.q, Np - 1)}
         return PredictorSettings(**{**self.predictor, **shorter, **own}, **self._sampling)
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
         """Settings of the compensator, with the ``[drive_limits]`` if there are any."""
-        return self._compensation().for_window(self.compensator_predictor.Np, self.look_ahead)
+        return self._compensation().for_window(self.compensator_predictor.Np, self.look_ahead, self.T_s)
 
     def changed(
         self, section: Literal["", "predictor", "compensator", "plant"], values: Mapping[str, Any]

@@ -206,6 +206,7 @@ REFUSED = [
     ("hal als25010_x --out x,y", "at which loadrt takes axes= apart"),
     ("hal als25010_x --out a$b", "at which loadrt takes axes= apart"),
     ("fit {log} --p 5,lots", "--p must be whole numbers with commas, got '5,lots'"),
+    ("fit {log} --look-ahead 60", "--look-ahead must be a time with its unit, such as 60ms or 0.06s, got '60'"),
     ("fit {log} --Np 20 --p 50", "p must be 1 … Np = 20, got 50"),
     ("fit {log} --out {folder} --name no-name", "name (--name) must be"),
     ("fit {log} --out {log}/deeper", "log.csv is a file, not a folder; choose another"),

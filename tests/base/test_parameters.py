@@ -112,7 +112,7 @@ def test_a_plan_goes_on_behind_a_preview_that_is_shorter_than_the_drive_needs(
     Np: int, preview: int | None, spacing: int | None, given: int | None, horizon: int
 ) -> None:
     # at most 120 spacings, and only where a stop fits into the preview: 20 + 10 + 5·2 + 3 = 43
-    settings = CompensatorSettings(preview=preview, spacing=spacing, horizon=given).for_window(Np, 345)
+    settings = CompensatorSettings(preview=preview, spacing=spacing, horizon=given).for_window(Np, 345, 1e-3)
     assert settings.horizon == horizon
 
 
