@@ -27,7 +27,7 @@ from two_mass.plant import TwoMassDrive
 
 from hybridsep.base.errors import HybridSepError
 from hybridsep.base.metrics import largest, peak_derivatives, rms
-from hybridsep.base.settings import PARAMETERS, CompensatorSettings
+from hybridsep.base.settings import PARAMETERS, CompensatorSettings, Limits
 from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import Sensor, cosimulate
 from hybridsep.cosim.run import Run
@@ -55,7 +55,9 @@ def machine_of_drive(recipe: Recipe) -> Machine:
     T_s, hold, x_d, Np = recipe.axis.T_s, recipe.settings.input_hold, trajectory(recipe), recipe.settings.Np
     error = x_d - TwoMassDrive(recipe.axis, float(x_d[0])).run(x_d)
     velocity, acceleration, jerk = (spare * peak for spare, peak in zip(SPARE, peak_derivatives(x_d, T_s), strict=True))
-    window = CompensatorSettings().window(recipe.model.look_ahead(T_s, hold), T_s)
+    limits, change_max = Limits(velocity, acceleration, jerk), 2 * largest(error)
+    given = CompensatorSettings(limits=limits, change_max=change_max)
+    window = given.window(recipe.model.look_ahead(T_s, hold), T_s)
     return machine_of(
         *(recipe.model, hold, T_s, "two_mass", f"Drive of two masses {recipe.index}"),
         predictor={"Np": Np, "p": min(50, Np, window)},
@@ -63,7 +65,7 @@ def machine_of_drive(recipe: Recipe) -> Machine:
             "velocity": velocity,
             "acceleration": acceleration,
             "jerk": jerk,
-            "change_max": 2 * largest(error),
+            "change_max": change_max,
         },
     )
 

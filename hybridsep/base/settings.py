@@ -19,6 +19,7 @@ from .errors import ParameterError, brief
 from .parameters import Parameter, choice, flag, real, whole
 
 _SPLINES = 120  # largest length of a plan that goes on behind the preview, in spacings: its solver's work is their cube
+_PLAN_MAX = 2000  # longest plan, samples
 
 PLAN_END = 3  # samples without change at the end of a compensator's plan, so that the third difference is zero after it
 
@@ -281,7 +282,8 @@ class CompensatorSettings(Settings):
     PARTS: ClassVar[Mapping[str, type[Settings]]] = {"limits": Limits}
 
     preview: int | None = whole(
-        *(200, 8, 2000, "samples of the command that are planned ahead, at least Np + 4·spacing + 3"), unless_given=None
+        *(200, 8, _PLAN_MAX, "samples of the command that are planned ahead, at least Np + 4·spacing + 3"),
+        unless_given=None,
     )
     spacing: int | None = whole(
         *(2, 1, 1000, "samples between the knots of the spline that changes the command, a divisor of Np"),
@@ -317,7 +319,7 @@ class CompensatorSettings(Settings):
         nonzero=1e-5,
     )
     horizon: int | None = whole(
-        *(0, 0, 2000, "samples of a plan: behind the preview the command is taken to go on at its last velocity"),
+        *(0, 0, _PLAN_MAX, "samples of a plan: behind the preview the command is taken to go on at its last velocity"),
         unless_given=None,
     )
 
@@ -330,10 +332,9 @@ class CompensatorSettings(Settings):
         if self.limits is None or self.change_max is None:
             return look_ahead
         change, own = 0.5 * self.change_max, self.limits
-        fastest = change / own.velocity, 2 * math.sqrt(change / own.acceleration), math.cbrt(32 * change / own.jerk)
+        fastest = change / own.velocity, 2 * math.sqrt(change / own.acceleration), (32 * change / own.jerk) ** (1 / 3)
         back = math.ceil(min(max(fastest) / T_s, look_ahead))
-        most = int(self.parameters()["horizon"].maximum)
-        return min(look_ahead + back, most) if 2 * back > look_ahead else look_ahead
+        return min(look_ahead + back, _PLAN_MAX) if 2 * back > look_ahead else look_ahead
 
     def window(self, look_ahead: int, T_s: float) -> int:
         """Return the samples of a window: a tenth of the preview, which is ``look_ahead`` samples if left out.
@@ -364,8 +365,7 @@ class CompensatorSettings(Settings):
                 most = max(1, min(most, (preview - Np - PLAN_END) // 4))
             spacing = max(one for one in range(1, most + 1) if Np % one == 0)
         if preview is None:  # enough after a window that is longer than a tenth of it, too
-            preview = max(look_ahead, Np + look_ahead * 3 // 4, Np + 4 * spacing + PLAN_END)
-            preview = min(preview, int(self.parameters()["preview"].maximum))
+            preview = min(max(look_ahead, Np + look_ahead * 3 // 4, Np + 4 * spacing + PLAN_END), _PLAN_MAX)
         problems = []
         if Np % spacing:
             problems.append(f"spacing must be ≥ 1 and divide Np = {Np}, got {spacing}")

@@ -39,11 +39,10 @@ _FOLLOWING_ERROR = 1.3
 """``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
 error below that was above it (``python -m benchmarks.faults``)."""
 
-LIMITS_WORDS = (
+LIMITS_WORDS = (  # what the limits of :func:`estimated_limits` are
     f"estimates, {', '.join(f'{one:g}' for one in MARGINS.tolist())} times the largest velocity, acceleration and jerk "
     "of the log; replace them by your drive's, and take out estimated = true, before a compensator moves it"
 )
-"""What the limits of :func:`estimated_limits` are."""
 
 _SCALE = 0.05
 """Velocity scale of what a compensator begins with, relative to the largest velocity of a log. A log's first motion may
@@ -72,10 +71,7 @@ _HOW = (
 def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
     """Return the entries of ``[drive_limits]`` of options by their names; empty without any.
 
-    :func:`~hybridsep.fitting.fit.fit` takes ``change_max`` and ``following_error_max`` from the log where they are not
-    among them.
-
-    ParameterError if some of the three limits are missing.
+    ParameterError if some of the three limits are missing; other entries are taken from the log then.
     """
     found = {entry: one.checked(given[one.name]) for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
     names = [parameter.name for parameter in Limits.parameters().values()]
@@ -243,7 +239,8 @@ class LookAheads:
             return [
                 "Where the model is right, plans leave as little or less with --look-ahead "
                 f"{1e3 * shortest * self.T_s:.4g}ms: they need less of the command ahead, and follow younger "
-                "measurements in shorter windows, at more work in a sample (up to three times)."
+                "measurements, at up to three times the work in a sample. With much friction a drive may be left with "
+                "twice as much all the same: compare both."
             ]
         if (longer := self.longer(now)) is None:
             return []

@@ -353,7 +353,9 @@ def fit(
     limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
     if given_limits:
         limits.pop("estimated", None)
-    most = _compensation(ahead, limits).window(needed, T_s)
+    own = Limits(**{one: limits[one] for one in Limits.parameters()}) if limits else None
+    compensation = CompensatorSettings(preview=ahead, limits=own, change_max=limits.get("change_max"))
+    most = compensation.window(needed, T_s)
     if look_ahead is not None and p and max(p) > most:
         raise ParameterError(
             f"p must be at most {most}, the samples in a window of a compensator that looks {look_ahead:g} s ahead, "
@@ -366,7 +368,7 @@ def fit(
     replayed = replace(replayed, offset=found.offset).with_peers(stage("peers on the second half", 0.8, 0.9))
     progress("a plant to try with", 0.9)
     plant = identified_plant(model, settings, recordings, tried)
-    machine = _machine(name, logs, model, settings, ahead, plant.entries, limits)
+    machine = _machine(name, logs, model, settings, compensation, plant.entries, limits)
     tracking = None
     if given_limits:
         tracking = expected_tracking(machine, recordings, stage("tracking error with compensation", 0.95, 1.0))
@@ -411,18 +413,12 @@ def _identified(
         return unit_gain_model(settings.T_s, f"{error}; a gain of 1 without lag is taken")
 
 
-def _compensation(look_ahead: int, limits: Mapping[str, Any]) -> CompensatorSettings:
-    """Return the settings that are given of a compensator, ``limits`` as in ``[drive_limits]``, if there are any."""
-    own = Limits(**{name: limits[name] for name in Limits.parameters()}) if limits else None
-    return CompensatorSettings(preview=look_ahead, limits=own, change_max=limits.get("change_max"))
-
-
 def _machine(
     name: str,
     logs: Sequence[Log],
     model: ModalModel,
     settings: PredictorSettings,
-    look_ahead: int,
+    given: CompensatorSettings,
     plant: Mapping[str, Any],
     limits: Mapping[str, Any],
 ) -> Machine:
@@ -431,13 +427,13 @@ def _machine(
     compensation = {"drive_limits": dict(limits)} if limits else {}
     known = {key: value for key in PredictorSettings.KNOWN if (value := getattr(settings, key))}
     if limits:  # as numbers, for whoever reads the file, and at least as many samples in a window as there are lags
-        given, T_s = _compensation(look_ahead, limits), settings.T_s
-        needed = model.look_ahead(T_s, settings.input_hold)
+        needed, T_s = model.look_ahead(settings.T_s, settings.input_hold), settings.T_s
         given = given.for_window(Np := given.window(needed, T_s), needed, T_s)
         assert given.spacing is not None
+        assert given.preview is not None
         if settings.p > Np:
             Np = -(-settings.p // given.spacing) * given.spacing
-            given = replace(given, preview=None, horizon=None).for_window(Np, look_ahead, T_s)
+            given = replace(given, preview=None, horizon=None).for_window(Np, given.preview, T_s)
         numbers = {"Np": Np, "preview": given.preview, "spacing": given.spacing}
         if given.horizon != given.preview:
             numbers["horizon"] = given.horizon

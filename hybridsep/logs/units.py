@@ -100,9 +100,8 @@ _SPELLINGS |= {
 }
 """Other spellings, in small letters, of the units' names; µ is u."""
 
-_SUFFIXES = ("mm", "um", "nm", "rad", "mrad", "urad", "deg", "s", "ms", "us", "ns")
-"""Units that end a name after an underscore or a comma, beside those in words, ``x_inch``; m is none, as ``x_m`` is
-rather the measured position."""
+_SUFFIXES = {"mm", "um", "nm", "inch", "meter", "rad", "mrad", "urad", "deg", "s", "ms", "us", "ns"}
+"""Units that end a name after an underscore or a comma; m is none, as ``x_m`` is rather the measured position."""
 
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
 _SLASH = re.compile(r"^(?P<name>.*?\S)\s*(?:/|\bin\b)\s*(?P<unit>\S+)\s*$")
@@ -164,8 +163,7 @@ def stated_unit(name: str) -> tuple[str, str]:
     if slash and _is_unit(slash["unit"]):
         return slash["name"], slash["unit"]
     suffix = _SUFFIX.match(name)
-    word = suffix["unit"].lower() if suffix else ""
-    if suffix and (plain_name(word) in _SUFFIXES or (len(word) > 3 and word in _SPELLINGS)):
+    if suffix and ({plain_name(suffix["unit"]), suffix["unit"].lower()} & _SUFFIXES):
         return suffix["name"], suffix["unit"]
     return name, ""
 

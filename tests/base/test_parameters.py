@@ -116,6 +116,11 @@ def test_a_plan_goes_on_behind_a_preview_that_is_shorter_than_the_drive_needs(
     assert settings.horizon == horizon
 
 
+def test_a_plan_is_longer_where_the_limits_are_slow_to_take_the_error_back() -> None:
+    given = [CompensatorSettings(limits=Limits(1.0, 10.0, jerk), change_max=0.04) for jerk in (1e3, 100.0, 1.0)]
+    assert [one.for_window(20, 200, 1e-3).horizon for one in given] == [200, 386, 400]
+
+
 @pytest.mark.parametrize(("t_init", "T_s", "count"), [
     (0.0, 1e-3, 0), (0.3, 1e-3, 300), (0.3, 1e-4, 3000), (0.29995, 1e-3, 300), (1.24205, 1e-3, 1243),
     (0.1 + 0.2, 0.1, 3), (4e-3 * (1 - 1e-12), 1e-3, 4), (1e-8, 1e-3, 1),  # (0.1 + 0.2) / 0.1 is just over three

@@ -14,8 +14,8 @@ from hybridsep.plants.stage_drive import StageDrive
 T_S, NP = 1e-3, 50
 
 
-def drive(f: float) -> StageDrive:
-    return StageDrive(ModalModel([Mode(20.0, 0.7, (40 * np.pi) ** 2)]), f=f, kappa=0.0, T_s=T_S, v_friction=1e-4)
+def drive(f: float, T_s: float) -> StageDrive:
+    return StageDrive(ModalModel([Mode(0.02 / T_s, 0.7, (0.04 * np.pi / T_s) ** 2)]), f, 0.0, T_s=T_s, v_friction=1e-4)
 
 
 def moves(seed: int) -> Array:
@@ -29,14 +29,14 @@ def moves(seed: int) -> Array:
     return np.concatenate(pieces)
 
 
-@pytest.mark.parametrize("f", [0.0, 2e-5])
-def test_it_compensates_other_moves_of_a_drive_with_friction(f: float) -> None:
+@pytest.mark.parametrize(("f", "T_s", "Np"), [(0.0, T_S, NP), (2e-5, T_S, NP), (0.0, 0.1 * T_S, 20 * NP)])
+def test_it_compensates_other_moves_of_a_drive_with_friction(f: float, T_s: float, Np: int) -> None:
     x_d, r = moves(0), moves(1)
-    x = simulate(drive(f), x_d, T_S)
+    x = simulate(drive(f, T_s), x_d, T_s)
     x[200:260] = np.nan  # missing measurements are no rows
-    rival = FirInverse.fitted([(x_d, x)], NP)
+    rival = FirInverse.fitted([(x_d, x)], Np)
     assert rival is not None
-    off, played = (cosimulate(PlayedCommand(u, T_S), drive(f), r) for u in (r, rival.command(r)))
+    off, played = (cosimulate(PlayedCommand(u, T_s), drive(f, T_s), r) for u in (r, rival.command(r)))
     assert rms(r - played.x) < (0.02 if f == 0.0 else 0.05) * rms(r - off.x)
 
 

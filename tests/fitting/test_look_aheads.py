@@ -120,6 +120,14 @@ def test_a_shorter_look_ahead_that_leaves_as_little_is_advised_and_does() -> Non
     assert all(one.left < 0.01 * found.off for found in (long, short) for one in found.tried if one.preview >= 200)
 
 
+def test_no_look_ahead_is_too_short_only_as_the_limits_are_slow_to_take_the_error_back() -> None:
+    lags, limits = ModalModel([Mode(4.0, 0.8, (8 * np.pi) ** 2)]), Limits(0.2, 1.0, 3.0)
+    moves, discrete = rest_to_rest([0.0, 0.05], limits, T_S, start_times=[0.3], duration=1.6), lags.discretise(T_S)
+    recording = Recording(moves, discrete.forced_response(discrete.rest(), moves)[0], 500)
+    machine = axis(lags, lags.look_ahead(T_S), acceleration=4.0, jerk=6.0, change_max=0.016)
+    assert not any("is too short" in line for line in looked(machine, recording).lines())
+
+
 def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
     """At 250 Hz, where the shortest plans have windows of three samples; the quick move comes after a slow one."""
     T_s = 4 * T_S
