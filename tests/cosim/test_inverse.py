@@ -41,7 +41,6 @@ def test_it_compensates_other_moves_of_a_drive_with_friction(f: float, T_s: floa
 
 
 def test_nothing_is_fitted_to_rest_or_to_what_is_missing() -> None:
-    rest = np.zeros(1000)
-    assert FirInverse.fitted([(rest, rest)], NP) is None
+    assert FirInverse.fitted([(np.zeros(1000), np.zeros(1000))], NP) is None
     assert FirInverse.fitted([(moves(0), np.full(len(moves(0)), np.nan))], NP) is None
     assert FirInverse.fitted([], NP) is None
