@@ -86,8 +86,7 @@ def test_settings_that_bind_are_told_of_commands_of_a_few_samples() -> None:
     machine = replace(axis(model, 200, velocity=10.0, acceleration=1e6, jerk=1e9), T_s=T_s)
     discrete = model.discretise(T_s)
     found = looked(machine, Recording(moves, discrete.forced_response(discrete.rest(), moves)[0], 100))
-    rows = {row[0]: row[3] for row in found.figures(shown_in("m"))[2]}
-    assert rows["10, chosen"] == "jerk_weight"
+    assert {row[0]: row[3] for row in found.figures(shown_in("m"))[2]}["10, chosen"] == "jerk_weight"
 
 
 @pytest.mark.parametrize(
@@ -120,12 +119,13 @@ def test_a_shorter_look_ahead_that_leaves_as_little_is_advised_and_does() -> Non
     assert all(one.left < 0.01 * found.off for found in (long, short) for one in found.tried if one.preview >= 200)
 
 
-def test_no_look_ahead_is_too_short_only_as_the_limits_are_slow_to_take_the_error_back() -> None:
-    lags, limits = ModalModel([Mode(4.0, 0.8, (8 * np.pi) ** 2)]), Limits(0.2, 1.0, 3.0)
-    moves, discrete = rest_to_rest([0.0, 0.05], limits, T_S, start_times=[0.3], duration=1.6), lags.discretise(T_S)
-    recording = Recording(moves, discrete.forced_response(discrete.rest(), moves)[0], 500)
-    machine = axis(lags, lags.look_ahead(T_S), acceleration=4.0, jerk=6.0, change_max=0.016)
-    assert not any("is too short" in line for line in looked(machine, recording).lines())
+def test_plans_go_on_where_the_limits_are_slow_to_take_the_error_back() -> None:
+    moves = rest_to_rest([0.0, 0.05], Limits(0.2, 1.0, 3.0), T_S, start_times=[0.3], duration=1.6)
+    machine = axis(SERVO, SERVO.look_ahead(T_S), acceleration=4.0, jerk=6.0, change_max=0.011)
+    stretch = Stretch.of(Trial(machine), [Recording(moves, moves, 500)])
+    assert stretch is not None
+    left = stretch.expected(machine.compensator_settings, machine.compensator_predictor.Np).compensated
+    assert rms(left) < 0.05 * stretch.off  # 0.7 in plans that end with the preview
 
 
 def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
