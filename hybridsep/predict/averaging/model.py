@@ -440,10 +440,13 @@ def _judged(
             measured = np.concatenate((measured[published], measured[known]))
             of_both = of_plans.update(predicted, measured, settings.lam, stack.weights)
         learned = replace(learned, stacks=(stack, of_both))
-    stack, led = learned.stack, state.leading.place
-    squares = stack.evidence[0] - 2.0 * stack.cross[led] + stack.gram[led, led]
-    least = CONSTANTS.discard_error * learned.scales[MODEL_RESIDUAL].largest_square * stack.evidence[1]
-    if not (state.doubts and squares > least and stack.weights[FRESH_START.place] > CONSTANTS.discard_above):
+    stack, led, fresh = learned.stack, state.leading.place, FRESH_START.place
+    window = learned.scales[MODEL_RESIDUAL].largest_square * settings.Np
+    squares = np.diag(stack.gram) - 2.0 * stack.cross  # of the errors so far, less those of the physics model
+    # Both began the run with the same evidence, so what they differ by has come in it
+    harm, seen = squares[led] - squares[fresh], state.evidence[MODEL_RESIDUAL].this.target_square
+    harmed = harm * seen > CONSTANTS.discard_harm * window**2
+    if not (state.doubts and harmed and stack.weights[fresh] > CONSTANTS.discard_above):
         return replace(state, learned=learned)
     # All experts go on with this run alone, and are judged anew.
     anew = {ARX_RESIDUAL: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(FRESH_START)}

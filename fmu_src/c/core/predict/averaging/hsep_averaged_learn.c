@@ -180,10 +180,7 @@ static void averaged_bridge(const hsep_averaged *self, hsep_real e[], hsep_int b
     const hsep_int known = self->Np - self->known;
     const hsep_real *e_h = hsep_at_const(self, self->e_h) + (self->n - self->Np);
     const hsep_real off = self->known > 0 ? e[known] - e_h[known] : 0.0;
-    hsep_real slope = 0.0;
-    if (begin > 0) {
-        slope = (e[begin - 1] - e_h[begin - 1] - off) / (hsep_real)(known - begin + 1);
-    }
+    const hsep_real slope = begin > 0 ? (e[begin - 1] - e_h[begin - 1] - off) / (hsep_real)(known - begin + 1) : 0.0;
     for (hsep_int i = known; i-- > begin;) {
         e[i] = e_h[i] + (slope * (hsep_real)(known - i) + off);
     }
@@ -267,11 +264,14 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
     averaged_judge_experts(self, e, self->Np, learned->scales, learned->errors);
     averaged_judge_stacks(self, e);
     const hsep_stack *stack = &learned->stacks[HSEP_OF_PREDICTIONS];
-    const hsep_int led = self->leading;
-    const hsep_real squares = stack->evidence[0] - 2.0 * stack->cross[led] + stack->gram[led * (HSEP_N_EXPERTS + 1)];
-    const hsep_real least = HSEP_AVERAGING_DISCARD_ERROR * learned->scales[HSEP_MODEL_RESIDUAL].largest_square;
-    if (hsep_averaged_doubts(self) && squares > least * stack->evidence[1] &&
-        stack->weights[HSEP_FRESH_START] > HSEP_AVERAGING_DISCARD_ABOVE) {
+    const hsep_int led = self->leading, fresh = HSEP_FRESH_START;
+    const hsep_real window = learned->scales[HSEP_MODEL_RESIDUAL].largest_square * (hsep_real)self->Np;
+    const hsep_real of_led = stack->gram[led * (HSEP_N_EXPERTS + 1)] - 2.0 * stack->cross[led];
+    const hsep_real of_fresh = stack->gram[fresh * (HSEP_N_EXPERTS + 1)] - 2.0 * stack->cross[fresh];
+    /* Both began the run with the same evidence, so what they differ by has come in it. */
+    const hsep_real seen = hsep_gram_square(hsep_warm_start_of_run(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL)));
+    if (hsep_averaged_doubts(self) && (of_led - of_fresh) * (seen / window) > HSEP_AVERAGING_DISCARD_HARM * window &&
+        stack->weights[fresh] > HSEP_AVERAGING_DISCARD_ABOVE) {
         /* All experts go on with this run alone, and are judged anew; their solutions begin at once. */
         hsep_expert_errors *errors = learned->errors;
         for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
