@@ -16,11 +16,11 @@ SIZE = 300
 TS = 1e-3  # s
 
 
-def heard(path: Array, residuals: Array, Np: int, ahead: int = 0) -> Memory:
+def heard(path: Array, residuals: Array, Np: int, ahead: int = 0, known: int | None = None) -> Memory:
     """Return a memory that has heard a path window by window, ``ahead`` samples before it was measured."""
     memory = Memory.init(SIZE, Np)
     for k in range(0, len(path) - ahead, Np):
-        memory = memory.append_commands(path[k : k + Np + ahead], Np).remember(residuals[k : k + Np])
+        memory = memory.append_commands(path[k : k + Np + ahead], known, Np).remember(residuals[k : k + Np])
     return memory
 
 
@@ -49,18 +49,26 @@ def test_the_stretch_is_that_of_a_search(Np: int, windows: int, seed: int) -> No
     assert found[1] == memory[end - 1]
 
 
+def test_of_stretches_that_are_alike_the_last_one_is_recalled() -> None:
+    rng = np.random.default_rng(9)
+    steps, residuals = rng.normal(size=64), rng.normal(size=248)
+    path = np.cumsum(np.concatenate((steps, steps, steps + 5e-3 * rng.normal(size=64), steps)))
+    recalled, _, _ = heard(path, residuals, 8, ahead=8).recalled(8)
+    np.testing.assert_array_equal(recalled, residuals[184:192])
+
+
 def test_a_path_that_is_known_further_ahead_is_heard_once() -> None:
     rng = np.random.default_rng(3)
     path, residuals = np.cumsum(rng.normal(size=400)), rng.normal(size=400)
     memory = heard(np.concatenate((np.zeros(60), path)), np.concatenate((np.zeros(60), residuals)), 20, ahead=40)
-    plain = heard(path, residuals, 20)
+    plain = heard(np.append(path, np.zeros(40)), residuals, 20, ahead=40, known=20)
     np.testing.assert_allclose(memory.distances, plain.distances, rtol=1e-9)
     np.testing.assert_array_equal(memory.commands, plain.commands)
 
 
 def test_a_memory_shorter_than_a_window_recalls_nothing() -> None:
     for memory in (Memory.init(20, 20), Memory.init(0, 20)):
-        residuals, _, alike = memory.append_commands(np.arange(20.0), 20).remember(np.ones(20)).recalled(20)
+        residuals, _, alike = memory.append_commands(np.arange(20.0), None, 20).remember(np.ones(20)).recalled(20)
         assert alike == 0.0
         np.testing.assert_array_equal(residuals, 0.0)
 
@@ -88,7 +96,7 @@ def test_a_repeated_part_is_predicted_by_its_first_time() -> None:
 def test_another_run_begins_at_rest_and_remembers() -> None:
     rng = np.random.default_rng(7)
     path, residuals = np.cumsum(rng.normal(size=200)), rng.normal(size=200)
-    again = heard(path, residuals, 20).restart().append_commands(path[:20], 20)
+    again = heard(path, residuals, 20).restart().append_commands(path[:20], None, 20)
     found, before, alike = again.recalled(20)
     np.testing.assert_array_equal(found, residuals[:20])
     assert before == 0.0
@@ -102,13 +110,13 @@ def test_another_run_recalls_what_was_measured_after_the_same_commands() -> None
     memory = heard(path, residuals, 20, ahead=40).restart()
     path -= path[0]
     for k in range(0, 60, 20):
-        memory = memory.append_commands(path[k : k + 20], 20).remember(residuals[k : k + 20])
-    recalled, before, _ = memory.append_commands(path[60:80], 20).recalled(20)
+        memory = memory.append_commands(path[k : k + 20], None, 20).remember(residuals[k : k + 20])
+    recalled, before, _ = memory.append_commands(path[60:80], None, 20).recalled(20)
     np.testing.assert_array_equal(recalled, residuals[60:80])
     assert before == residuals[59]
 
 
 def test_another_run_begins_without_a_residual() -> None:
-    memory = Memory.init(SIZE, 20).append_commands(np.arange(20.0), 20).remember(np.full(20, 3.0)).restart()
+    memory = Memory.init(SIZE, 20).append_commands(np.arange(20.0), None, 20).remember(np.full(20, 3.0)).restart()
     assert memory.residuals[-1] == 0.0
     np.testing.assert_array_equal(memory.residuals[-21:-1], 3.0)

@@ -268,7 +268,7 @@ class AveragedModel:
         :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
         """
         x, path, held = window.x_pb, window.raw_commands, like.predictions if like else {}
-        memory = like.memory if like else self.run.memory.append_commands(path[: self.static.n_known], self.settings.Np)
+        memory = like.memory if like else self.run.memory.append_commands(path, self.static.n_known, self.settings.Np)
         recalled = memory.recalled(len(path))
         rows, _ = self.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, rows, {}, recalled)

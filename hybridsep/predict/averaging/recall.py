@@ -2,9 +2,10 @@
 
 Most axes repeat: a part program, a pick and place, a test signal. The memory has the commands as they came, and the
 residuals. For each lag ``τ`` a sum ``D_τ ← γ D_τ + (Δu(k) − Δu(k−τ))²`` of changes ``Δu`` over some samples follows how
-much the commands ahead, and those before them, are like those ``τ`` samples before; it fades in a window. The lag with
-the least gives the residuals that were measured then. They count by ``1/(1 + (D_τ/S)/ρ²)``, with the same sum ``S`` of
-the changes themselves, and a tolerance ``ρ``.
+much the commands ahead, and those before them, are like those ``τ`` samples before; it fades in as many as are
+predicted. The lag with the least gives the residuals that were measured then, the last one of those that are alike:
+what a compensator had told the drive in place of the commands was most like now. They count by ``1/(1 + (D_τ/S)/ρ²)``,
+with the same sum ``S`` of the changes themselves, and a tolerance ``ρ``.
 """
 
 import math
@@ -19,6 +20,8 @@ _UPDATES = 25
 """Samples of a window, at most, at which all lags are compared: a controller does it in the samples between them."""
 
 _ALIKE = 1e-100  # square of a change, m², that counts as 0: sums of smaller ones would slow a processor down
+
+_SAME = 0.01  # distance, relative to the tolerated one, below which stretches are told apart by their age alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +51,12 @@ class Memory:
         residuals = np.append(self.residuals[1:], 0.0)[: len(self.residuals)]  # also with no memory
         return Memory(commands, residuals, np.zeros_like(self.distances), 0.0, 0)
 
-    def append_commands(self, path: Array, Np: int) -> "Memory":
-        """Return the memory that knows the commands ahead, ``(m,)``, m."""
-        n, new = len(self.residuals), path[self.n_ahead :]
+    def append_commands(self, path: Array, n_known: int | None, Np: int) -> "Memory":
+        """Return the memory that knows the first ``n_known`` commands of those to predict, ``(m,)``, m."""
+        n, new = len(self.residuals), path[self.n_ahead : n_known]
         stride = len(self.commands) - n
         commands, distances = np.concatenate((self.commands, new)), self.distances.copy()
-        gamma, moved, begin = math.exp(-stride / Np), self.moved, len(self.commands)
+        gamma, moved, begin = math.exp(-stride / len(path)), self.moved, len(self.commands)
         end = begin + len(new)
         begin = end - Np * (len(new) // Np)  # windows end with the commands; before the first one there is rest
         changes = commands[stride:] - commands[:-stride]
@@ -62,7 +65,7 @@ class Memory:
                 distances *= gamma
                 distances += (changes[k] - changes[k - n : k]) ** 2 + _ALIKE
                 moved = gamma * moved + (float(changes[k]) ** 2 + _ALIKE)
-        n_ahead = max(self.n_ahead, len(path))
+        n_ahead = max(self.n_ahead, len(path[:n_known]))
         return replace(self, commands=commands[len(new) :], distances=distances, moved=moved, n_ahead=n_ahead)
 
     def recalled(self, n: int) -> tuple[Array, float, float]:
@@ -75,8 +78,10 @@ class Memory:
         size = len(self.residuals)
         if size <= n:
             return np.zeros(n), 0.0, 0.0
-        lag = n + int(np.argmin(self.distances[1 : size - n + 1][::-1]))  # the shortest lag of equals
-        distance, tolerated = float(self.distances[size - lag]), CONSTANTS.recall_tolerance**2 * self.moved
+        tolerated = CONSTANTS.recall_tolerance**2 * self.moved
+        compared = np.maximum(self.distances[1 : size - n + 1], _SAME * tolerated)
+        lag = n + int(np.argmin(compared[::-1]))  # the shortest lag of equals
+        distance = float(self.distances[size - lag])
         alike = tolerated / (tolerated + distance) if distance > 0.0 else 0.0
         return self.residuals[size - lag : size - lag + n], float(self.residuals[size - lag - 1]), alike
 

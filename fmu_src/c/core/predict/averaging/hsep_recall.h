@@ -39,7 +39,7 @@ static inline hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predic
     self->Np = parameters->settings.Np;
     self->n = self->lag = hsep_predicted(parameters);
     self->stride = self->Np > HSEP_RECALL_UPDATES ? self->Np / HSEP_RECALL_UPDATES : 1;
-    self->fading = hsep_exp(-(hsep_real)self->stride / (hsep_real)self->Np);
+    self->fading = hsep_exp(-(hsep_real)self->stride / (hsep_real)self->n);
     self->commands = hsep_take(&end, (hsep_real)self->stride);
     self->changes = hsep_take(&end, size + (hsep_real)self->stride);
     self->residuals = hsep_take(&end, size);
@@ -65,12 +65,19 @@ static inline void recall_add(
     }
 }
 
+/* Distance at which what is recalled counts by half, m2. */
+static inline hsep_real recall_tolerated(const hsep_recall *self)
+{
+    return HSEP_AVERAGING_RECALL_TOLERANCE * HSEP_AVERAGING_RECALL_TOLERANCE * self->moved;
+}
+
 /* Compare the latched change with those first ... last - 1 samples before it; in the last comparison of a window, which
  * its forecast has, look for the lag with the least distance. */
 static inline void recall_compare(hsep_recall *self, hsep_int first, hsep_int last, int is_last)
 {
     const hsep_int length = self->size + self->stride;
     const hsep_real *changes = hsep_at(self, self->changes), now = changes[self->compared];
+    const hsep_real same = HSEP_RECALL_SAME * recall_tolerated(self);
     hsep_real *distances = hsep_at(self, self->distances);
     hsep_int lag = self->lag;
     for (hsep_int begin = first; begin < last;) { /* up to the end of the ring, and from its beginning on */
@@ -79,9 +86,8 @@ static inline void recall_compare(hsep_recall *self, hsep_int first, hsep_int la
         begin += count;
     }
     const hsep_int begin = first > self->n ? first - 1 : self->n, end = hsep_min(last, self->size) - 1;
-    if (is_last && begin < end) { /* the shortest lag of equals */
-        const hsep_int found = begin + hsep_place_of_least(distances + begin, end - begin);
-        lag = distances[found] < distances[lag - 1] ? found + 1 : lag;
+    for (hsep_int i = begin; is_last && i < end && distances[lag - 1] > same; i++) { /* the shortest lag of equals */
+        lag = distances[i] < distances[lag - 1] ? i + 1 : lag;
     }
     self->lag = lag;
 }
@@ -127,7 +133,7 @@ static inline void hsep_recall_remember(hsep_recall *self, const hsep_real e[])
 static inline hsep_real hsep_recall_forecast(const hsep_recall *self, hsep_real last, hsep_real recalled[])
 {
     const hsep_real *residuals = hsep_at_const(self, self->residuals);
-    const hsep_real tolerated = HSEP_AVERAGING_RECALL_TOLERANCE * HSEP_AVERAGING_RECALL_TOLERANCE * self->moved;
+    const hsep_real tolerated = recall_tolerated(self);
     const hsep_int n = self->n, lag = self->lag;
     hsep_zero(recalled, n);
     if (self->size <= self->n) {
