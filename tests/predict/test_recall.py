@@ -49,12 +49,13 @@ def test_the_stretch_is_that_of_a_search(Np: int, windows: int, seed: int) -> No
     assert found[1] == memory[end - 1]
 
 
-def test_of_stretches_that_are_alike_the_last_one_is_recalled() -> None:
+def test_of_stretches_that_are_alike_the_last_one_is_recalled_behind_a_compensator() -> None:
     rng = np.random.default_rng(9)
-    steps, residuals = rng.normal(size=64), rng.normal(size=248)
+    steps, residuals = rng.normal(size=64), rng.normal(size=256)
     path = np.cumsum(np.concatenate((steps, steps, steps + 5e-3 * rng.normal(size=64), steps)))
-    recalled, _, _ = heard(path, residuals, 8, ahead=8).recalled(8)
-    np.testing.assert_array_equal(recalled, residuals[184:192])
+    memory = heard(path, residuals, 8)
+    np.testing.assert_array_equal(memory.recalled(8, modified=True)[0], residuals[192:200])
+    np.testing.assert_array_equal(memory.recalled(8)[0], residuals[128:136])
 
 
 def test_a_path_that_is_known_further_ahead_is_heard_once() -> None:

@@ -269,7 +269,7 @@ class AveragedModel:
         """
         x, path, held = window.x_pb, window.raw_commands, like.predictions if like else {}
         memory = like.memory if like else self.run.memory.append_commands(path, self.static.n_known, self.settings.Np)
-        recalled = memory.recalled(len(path))
+        recalled = memory.recalled(len(path), modified=self.static.n_known is not None)
         rows, _ = self.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, rows, {}, recalled)
         if STATIC in solved:

@@ -3,9 +3,9 @@
 Most axes repeat: a part program, a pick and place, a test signal. The memory has the commands as they came, and the
 residuals. For each lag ``τ`` a sum ``D_τ ← γ D_τ + (Δu(k) − Δu(k−τ))²`` of changes ``Δu`` over some samples follows how
 much the commands ahead, and those before them, are like those ``τ`` samples before; it fades in as many as are
-predicted. The lag with the least gives the residuals that were measured then, the last one of those that are alike:
-what a compensator had told the drive in place of the commands was most like now. They count by ``1/(1 + (D_τ/S)/ρ²)``,
-with the same sum ``S`` of the changes themselves, and a tolerance ``ρ``.
+predicted. The lag with the least gives the residuals that were measured then, behind a compensator the shortest of
+those that are alike, as what the drive was told in place of the commands was most like now. They count by
+``1/(1 + (D_τ/S)/ρ²)``, with the same sum ``S`` of the changes themselves, and a tolerance ``ρ``.
 """
 
 import math
@@ -21,7 +21,7 @@ _UPDATES = 25
 
 _ALIKE = 1e-100  # square of a change, m², that counts as 0: sums of smaller ones would slow a processor down
 
-_SAME = 0.01  # distance, relative to the tolerated one, below which stretches are told apart by their age alone
+_SAME = 1e-4  # distance, relative to the changes', below which stretches behind a compensator are the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,20 +68,20 @@ class Memory:
         n_ahead = max(self.n_ahead, len(path[:n_known]))
         return replace(self, commands=commands[len(new) :], distances=distances, moved=moved, n_ahead=n_ahead)
 
-    def recalled(self, n: int) -> tuple[Array, float, float]:
+    def recalled(self, n: int, *, modified: bool = False) -> tuple[Array, float, float]:
         """Return residuals after the commands most like those ahead, ``(n,)``, m, the one before, and how they count.
 
         They do not if the memory is shorter.
 
-        ``n``: samples from the last measured one to the last known command.
+        ``n``: samples from the last measured one to the last known command; ``modified``: whether a compensator tells
+        the drive others.
         """
         size = len(self.residuals)
         if size <= n:
             return np.zeros(n), 0.0, 0.0
-        tolerated = CONSTANTS.recall_tolerance**2 * self.moved
-        compared = np.maximum(self.distances[1 : size - n + 1], _SAME * tolerated)
-        lag = n + int(np.argmin(compared[::-1]))  # the shortest lag of equals
-        distance = float(self.distances[size - lag])
+        compared = np.maximum(self.distances, _SAME * self.moved if modified else 0.0)
+        lag = n + int(np.argmin(compared[1 : size - n + 1][::-1]))  # the shortest lag of equals
+        distance, tolerated = float(self.distances[size - lag]), CONSTANTS.recall_tolerance**2 * self.moved
         alike = tolerated / (tolerated + distance) if distance > 0.0 else 0.0
         return self.residuals[size - lag : size - lag + n], float(self.residuals[size - lag - 1]), alike
 

@@ -128,6 +128,23 @@ static inline void hsep_axpy(hsep_real *restrict y, hsep_real a, const hsep_real
 
 static inline hsep_real hsep_lesser(hsep_real a, hsep_real b) { return a < b ? a : b; } /* one instruction */
 
+/* The first place in a, (n,), n > 0, of what is at most same, or else of the least. */
+static inline hsep_int hsep_place_of_least(const hsep_real a[], hsep_int n, hsep_real same)
+{
+    hsep_int place = 0;
+    for (hsep_int i = 1; i < n && a[place] > same; i++) {
+        for (const hsep_real least = a[place]; i + 4 <= n; i += 4) { /* most hold none that is less */
+            if (hsep_lesser(hsep_lesser(a[i], a[i + 1]), hsep_lesser(a[i + 2], a[i + 3])) < least) {
+                break;
+            }
+        }
+        if (i < n && a[i] < a[place]) {
+            place = i;
+        }
+    }
+    return place;
+}
+
 /* What is left of y behind sum_r a_r x_r over four arrays x_r, one after the other: of numbers or vectors at j. */
 #define HSEP_TAKE(y, a0, x0, a1, x1, a2, x2, a3, x3, at, j) \
     (((((y) - (a0) * *at((x0) + (j))) - (a1) * *at((x1) + (j))) - (a2) * *at((x2) + (j))) - (a3) * *at((x3) + (j)))

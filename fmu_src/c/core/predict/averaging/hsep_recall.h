@@ -16,6 +16,7 @@ typedef struct {
     hsep_int Np;         /* samples of a window */
     hsep_int n;          /* samples of a prediction: from the last residual to the last command */
     hsep_real fading;    /* of a sum from one comparison to the next */
+    hsep_real same;      /* distance, relative to moved, below which the shortest lag is taken: behind a compensator */
     hsep_real moved;     /* m2, sum of the squares of the changes */
     hsep_int heard;      /* commands of this window that came */
     hsep_int oldest;     /* place of the command a stride ago, */
@@ -28,22 +29,22 @@ typedef struct {
     hsep_int residuals;  /* (size,) m, ring */
     hsep_int distances;  /* (size,) m2, of the lags 1 ... size */
 } hsep_recall;
-HSEP_ASSERT_WORDS(hsep_recall, 16);
+HSEP_ASSERT_WORDS(hsep_recall, 17);
 
 /* It is all that a block of 0 needs to be at rest. */
 static inline hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_real size = (hsep_real)parameters->averaging.recall;
     hsep_real end = HSEP_WORDS(hsep_recall);
     self->size = parameters->averaging.recall;
     self->Np = parameters->settings.Np;
     self->n = self->lag = hsep_predicted(parameters);
     self->stride = self->Np > HSEP_RECALL_UPDATES ? self->Np / HSEP_RECALL_UPDATES : 1;
     self->fading = hsep_exp(-(hsep_real)self->stride / (hsep_real)self->n);
+    self->same = parameters->planned ? HSEP_RECALL_SAME : 0.0;
     self->commands = hsep_take(&end, (hsep_real)self->stride);
-    self->changes = hsep_take(&end, size + (hsep_real)self->stride);
-    self->residuals = hsep_take(&end, size);
-    self->distances = hsep_take(&end, size);
+    self->changes = hsep_take(&end, (hsep_real)(self->size + self->stride));
+    self->residuals = hsep_take(&end, (hsep_real)self->size);
+    self->distances = hsep_take(&end, (hsep_real)self->size);
     return end * sizeof(hsep_real);
 }
 
@@ -65,31 +66,23 @@ static inline void recall_add(
     }
 }
 
-/* Distance at which what is recalled counts by half, m2. */
-static inline hsep_real recall_tolerated(const hsep_recall *self)
-{
-    return HSEP_AVERAGING_RECALL_TOLERANCE * HSEP_AVERAGING_RECALL_TOLERANCE * self->moved;
-}
-
 /* Compare the latched change with those first ... last - 1 samples before it; in the last comparison of a window, which
  * its forecast has, look for the lag with the least distance. */
 static inline void recall_compare(hsep_recall *self, hsep_int first, hsep_int last, int is_last)
 {
     const hsep_int length = self->size + self->stride;
     const hsep_real *changes = hsep_at(self, self->changes), now = changes[self->compared];
-    const hsep_real same = HSEP_RECALL_SAME * recall_tolerated(self);
     hsep_real *distances = hsep_at(self, self->distances);
-    hsep_int lag = self->lag;
     for (hsep_int begin = first; begin < last;) { /* up to the end of the ring, and from its beginning on */
         const hsep_int place = (self->compared + begin) % length, count = hsep_min(last - begin, length - place);
         recall_add(distances + (begin - 1), changes + place, count, now, self->fading);
         begin += count;
     }
     const hsep_int begin = first > self->n ? first - 1 : self->n, end = hsep_min(last, self->size) - 1;
-    for (hsep_int i = begin; is_last && i < end && distances[lag - 1] > same; i++) { /* the shortest lag of equals */
-        lag = distances[i] < distances[lag - 1] ? i + 1 : lag;
+    if (is_last && begin < end && distances[self->lag - 1] > self->same * self->moved) { /* the shortest of equals */
+        const hsep_int found = begin + hsep_place_of_least(distances + begin, end - begin, self->same * self->moved);
+        self->lag = distances[found] < distances[self->lag - 1] ? found + 1 : self->lag;
     }
-    self->lag = lag;
 }
 
 /* Take in the command that comes next, m, relative to the start. Cost: size / stride multiply-adds. */
@@ -133,7 +126,7 @@ static inline void hsep_recall_remember(hsep_recall *self, const hsep_real e[])
 static inline hsep_real hsep_recall_forecast(const hsep_recall *self, hsep_real last, hsep_real recalled[])
 {
     const hsep_real *residuals = hsep_at_const(self, self->residuals);
-    const hsep_real tolerated = recall_tolerated(self);
+    const hsep_real tolerated = HSEP_AVERAGING_RECALL_TOLERANCE * HSEP_AVERAGING_RECALL_TOLERANCE * self->moved;
     const hsep_int n = self->n, lag = self->lag;
     hsep_zero(recalled, n);
     if (self->size <= self->n) {
