@@ -52,7 +52,7 @@ def test_the_stretch_is_that_of_a_search(Np: int, windows: int, seed: int) -> No
 def test_of_stretches_that_are_alike_the_last_one_is_recalled_behind_a_compensator() -> None:
     rng = np.random.default_rng(9)
     steps, residuals = rng.normal(size=64), rng.normal(size=256)
-    path = np.cumsum(np.concatenate((steps, steps, steps + 5e-3 * rng.normal(size=64), steps)))
+    path = np.cumsum(np.concatenate((steps, steps, steps + 2e-3 * rng.normal(size=64), steps)))
     memory = heard(path, residuals, 8)
     np.testing.assert_array_equal(memory.recalled(8, modified=True)[0], residuals[192:200])
     np.testing.assert_array_equal(memory.recalled(8)[0], residuals[128:136])

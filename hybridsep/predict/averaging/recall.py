@@ -21,7 +21,7 @@ _UPDATES = 25
 
 _ALIKE = 1e-100  # square of a change, m², that counts as 0: sums of smaller ones would slow a processor down
 
-_SAME = 1e-4  # distance, relative to the changes', below which stretches behind a compensator are the same
+_SAME = 1e-5  # distance, relative to the changes', below which stretches behind a compensator are the same
 
 
 @dataclass(frozen=True, eq=False)

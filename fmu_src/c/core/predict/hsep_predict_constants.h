@@ -73,7 +73,7 @@
 /* hybridsep/predict/averaging/recall.py */
 #define HSEP_RECALL_UPDATES 25
 #define HSEP_RECALL_ALIKE HSEP_TINY(1e-100)
-#define HSEP_RECALL_SAME 0.0001
+#define HSEP_RECALL_SAME 1e-05
 
 /* hybridsep/predict/averaging/model.py */
 #define HSEP_AVERAGING_LITTLE 0.1
