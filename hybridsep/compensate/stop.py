@@ -20,7 +20,9 @@ _TRIES = 12
 last one each time, and none where eight fail, an axis with 50 ms of look-ahead stood 6 mm off: the next window asked
 for the same (``docs/experiments/2026-11-29-stops-by-bisection.md``)."""
 
-_STILL = 1e-12  # row of the last stop's own part, in limits, below which that part does not matter there
+_STILL, _MOST = 1e-12, 10.0
+"""Row of the last stop's own part, in limits, below which that part does not matter there; and largest share of it:
+that part is a difference of rounded numbers, and a hundred times it, window after window, amplify their rounding."""
 
 
 class Stop:
@@ -76,14 +78,11 @@ class Stop:
 
 
 def _share(rows: Array, own: Array, low: Array, high: Array) -> float | None:
-    """Return the least share, 0 to 1, of the last stop's own part with which all rows keep their bounds; None: none.
-
-    Others could make room too, but that part is a difference: a thousand times it would be a thousand times rounding.
-    """
+    """Return the share of the last stop's own part, nearest 0, with which all rows keep their bounds; None: none."""
     matters = np.abs(own) > _STILL
     if not np.all(matters | ((rows >= low) & (rows <= high))):
         return None
     to_low, to_high = (low - rows)[matters] / own[matters], (high - rows)[matters] / own[matters]
-    least = float(np.max(np.minimum(to_low, to_high), initial=0.0))
-    most = float(np.min(np.maximum(to_low, to_high), initial=1.0))
-    return least if least <= most else None
+    least = float(np.max(np.minimum(to_low, to_high), initial=-_MOST))
+    most = float(np.min(np.maximum(to_low, to_high), initial=_MOST))
+    return min(max(0.0, least), most) if least <= most else None

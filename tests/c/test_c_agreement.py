@@ -51,7 +51,7 @@ def test_random_loops_command_the_same(seed: int, model: str, fixed: dict[str, f
         (20, f"{COMPENSATOR}_als25010_y", -3.3, 10, 400, {}),
         (13, f"{COMPENSATOR}_als25010_y", -3.3, 100, 700, {}),
         (149, COMPENSATOR, 0.1745, 200, 500, {}),  # a plan does not depend on the splines that it does not change
-        # A stop takes no more than all of the last one's own part, which may be rounding
+        # A stop takes no large multiple of the last one's own part, which may be rounding
         (10020, f"{COMPENSATOR}_als25010_x", -3.3, 45, 300, {"preview": 112, "horizon": 254}),
         # Wide splines count in nothing that regularises a programme
         (10305, COMPENSATOR, 0.17453292, 143, 262, {}),

@@ -49,6 +49,7 @@
 /* hybridsep/compensate/stop.py */
 #define HSEP_STOP_TRIES 12
 #define HSEP_STOP_STILL 1e-12
+#define HSEP_STOP_MOST 10.0
 /* clang-format on */
 
 #endif

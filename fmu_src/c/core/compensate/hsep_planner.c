@@ -483,14 +483,13 @@ static void stop_bounds(hsep_stop *self, const hsep_planner *planner, const hsep
     }
 }
 
-/* Least share, 0 to 1, of the last stop's own part with which all rows keep their bounds, so far on the way; NaN: none.
- * Others could make room too, but that part is a difference: a thousand times it would be a thousand times rounding. */
+/* Share of the last stop's own part, nearest 0, with which all rows keep their bounds, so far on the way; NaN: none. */
 static hsep_real stop_share(const hsep_stop *self, hsep_real length)
 {
     const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);
     const hsep_real *start = hsep_at_const(self, self->start), *way = hsep_at_const(self, self->way);
     const hsep_real *own = hsep_at_const(self, self->own_rows);
-    hsep_real least = 0.0, most = 1.0;
+    hsep_real least = -HSEP_STOP_MOST, most = HSEP_STOP_MOST;
     for (hsep_int r = 0; r < HSEP_ORDERS * self->preview; r++) {
         const hsep_real row = start[r] + length * way[r];
         if (hsep_fabs(own[r]) > HSEP_STOP_STILL) {
@@ -501,7 +500,7 @@ static hsep_real stop_share(const hsep_stop *self, hsep_real length)
             return (hsep_real)NAN;
         }
     }
-    return least <= most ? least : (hsep_real)NAN;
+    return least <= most ? hsep_fmin(hsep_fmax(0.0, least), most) : (hsep_real)NAN;
 }
 
 HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self)
