@@ -91,7 +91,7 @@ VARIANTS: Mapping[str, Changes] = {
     "no doubting expert D": NO_DOUBTING,
     "no D, earlier runs count for 3 windows": together(NO_DOUBTING, constants(warm_windows_max=3.0)),
     "earlier runs never forgotten": constants(discard_above=2.0),
-    "earlier runs forgotten whatever they err by": constants(discard_harm=0.0),
+    "earlier runs forgotten whatever they err by": constants(discard_error=0.0, discard_harm=0.0),
     "A's bound does not grow": {FORECAST: [("growth = before > 0.0 ?", "growth = before < 0.0 ?")]},
     "hold goes on where the command turns": {
         FORECAST: [("turned = hsep_disturbances_turned(disturbances, row);", "turned = ((void)row, 0.0);")]

@@ -55,12 +55,14 @@ class AveragingConstants:
     # weight of earlier runs, relative to the one they have, in the expert that doubts them: a prior from a tenth of a
     # window. Without any, changed plants are worse by an eighth
     warm_prior_weight: float = 0.003
-    # weight of that expert in the stack from which on earlier runs are forgotten, and the product of the sums of
-    # squares that the one that led has erred by more in this run, and of all residuals that it had, each relative to
-    # the largest of a window: with a weight of 0.5 plants that have not changed are worse by 2 %; where a creep before
-    # the first motion decides, a rack has 1.3 times the error, warm, and with 0.1 a joint of an arm 1.1 times
+    # from which on earlier runs are forgotten: weight of that expert in the stack; mean square error of the one that
+    # led, relative to the largest of a window; and the product of the sums of squares that it has erred by more in this
+    # run, and of all residuals of the run, relative to the same: with a weight of 0.5 plants that have not changed are
+    # worse by 2 %; without an error a changed drive has to 5 times the error; without a product a creep before the
+    # first motion decides, and a rack has 1.3 times, warm, with 0.5 a changed drive 2.7 times
     discard_above: float = 0.7
-    discard_harm: float = 0.5
+    discard_error: float = 0.003
+    discard_harm: float = 0.1
     # least velocity of the friction's change of sign relative to the velocity scale, and the ratio from one of the six
     # to the next: half a decade, which neighbours interpolate within; with 5/6 of one the stage's spiral has four times
     # the error, warm

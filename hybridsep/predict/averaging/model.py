@@ -441,11 +441,12 @@ def _judged(
             of_both = of_plans.update(predicted, measured, settings.lam, stack.weights)
         learned = replace(learned, stacks=(stack, of_both))
     stack, led, fresh = learned.stack, state.leading.place, FRESH_START.place
-    window = learned.scales[MODEL_RESIDUAL].largest_square * settings.Np
-    squares = np.diag(stack.gram) - 2.0 * stack.cross  # of the errors so far, less those of the physics model
+    largest, (total, rows) = learned.scales[MODEL_RESIDUAL].largest_square, stack.evidence
+    squares = np.diag(stack.gram) - 2.0 * stack.cross + total  # of the errors so far
     # Both began the run with the same evidence, so what they differ by has come in it
     harm, seen = squares[led] - squares[fresh], state.evidence[MODEL_RESIDUAL].this.target_square
-    harmed = harm * seen > CONSTANTS.discard_harm * window**2
+    errs = squares[led] > CONSTANTS.discard_error * largest * rows
+    harmed = errs and harm * seen > CONSTANTS.discard_harm * (largest * settings.Np) ** 2
     if not (state.doubts and harmed and stack.weights[fresh] > CONSTANTS.discard_above):
         return replace(state, learned=learned)
     # All experts go on with this run alone, and are judged anew.

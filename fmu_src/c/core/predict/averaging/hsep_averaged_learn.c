@@ -265,24 +265,24 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
     averaged_judge_stacks(self, e);
     const hsep_stack *stack = &learned->stacks[HSEP_OF_PREDICTIONS];
     const hsep_int led = self->leading, fresh = HSEP_FRESH_START;
-    const hsep_real window = learned->scales[HSEP_MODEL_RESIDUAL].largest_square * (hsep_real)self->Np;
+    const hsep_real largest = learned->scales[HSEP_MODEL_RESIDUAL].largest_square, unit = largest * (hsep_real)self->Np;
+    /* Both began the run with the same evidence, so what they differ by has come in it. */
     const hsep_real of_led = stack->gram[led * (HSEP_N_EXPERTS + 1)] - 2.0 * stack->cross[led];
     const hsep_real of_fresh = stack->gram[fresh * (HSEP_N_EXPERTS + 1)] - 2.0 * stack->cross[fresh];
-    /* Both began the run with the same evidence, so what they differ by has come in it. */
     const hsep_real seen = hsep_gram_square(hsep_warm_start_of_run(hsep_averaged_evidence(self, HSEP_MODEL_RESIDUAL)));
-    if (hsep_averaged_doubts(self) && (of_led - of_fresh) * (seen / window) > HSEP_AVERAGING_DISCARD_HARM * window &&
-        stack->weights[fresh] > HSEP_AVERAGING_DISCARD_ABOVE) {
+    if (hsep_averaged_doubts(self) && stack->weights[fresh] > HSEP_AVERAGING_DISCARD_ABOVE &&
+        stack->evidence[0] + of_led > HSEP_AVERAGING_DISCARD_ERROR * largest * stack->evidence[1] &&
+        (of_led - of_fresh) * (seen / unit) > HSEP_AVERAGING_DISCARD_HARM * unit) {
         /* All experts go on with this run alone, and are judged anew; their solutions begin at once. */
-        hsep_expert_errors *errors = learned->errors;
         for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
             hsep_warm_start_forget_earlier(hsep_averaged_evidence(self, i));
         }
-        errors[0] = errors[HSEP_STATIC - HSEP_REGRESSIONS] = (hsep_expert_errors){0.0, 1.0};
-        errors[self->leading - HSEP_REGRESSIONS] = errors[HSEP_FRESH_START - HSEP_REGRESSIONS];
+        learned->errors[0] = learned->errors[HSEP_STATIC - HSEP_REGRESSIONS] = (hsep_expert_errors){0.0, 1.0};
+        learned->errors[led - HSEP_REGRESSIONS] = learned->errors[fresh - HSEP_REGRESSIONS];
         for (hsep_int i = 0; i < HSEP_N_STACKS; i++) {
             hsep_stack_init(&learned->stacks[i]);
         }
-        hsep_averaged_prepare_solutions(self, learned->scales, errors);
+        hsep_averaged_prepare_solutions(self, learned->scales, learned->errors);
     }
 }
 

@@ -190,9 +190,8 @@ static inline void hsep_stack_others(const hsep_stack *self, hsep_real others[HS
 /* HSEP_ARX_COMMAND, if it has more weight than HSEP_ARX_RESIDUAL and HSEP_STATIC together; else HSEP_ARX_RESIDUAL. */
 static inline hsep_int hsep_stack_leader(const hsep_stack *self)
 {
-    const hsep_real *weights = self->weights;
-    return weights[HSEP_ARX_COMMAND] > weights[HSEP_ARX_RESIDUAL] + weights[HSEP_STATIC] ? HSEP_ARX_COMMAND
-                                                                                         : HSEP_ARX_RESIDUAL;
+    const hsep_real *w = self->weights;
+    return w[HSEP_ARX_COMMAND] > w[HSEP_ARX_RESIDUAL] + w[HSEP_STATIC] ? HSEP_ARX_COMMAND : HSEP_ARX_RESIDUAL;
 }
 
 /* Give an expert the evidence of another, as if it had predicted the same so far. */
