@@ -61,8 +61,7 @@ def fit(
     known: dict[str, float],
     reading: options.ReadingOptions,
     list_channels: Annotated[
-        bool,
-        typer.Option("--list-channels", help="Print what the log holds, with units, and do nothing else."),
+        bool, typer.Option("--list-channels", help="Print what the log holds, with units, and do nothing else.")
     ] = False,
     force: options.ForceOption = False,
     as_json: options.JsonOption = False,

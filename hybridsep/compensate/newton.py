@@ -223,11 +223,7 @@ def slopes_of(
         of_velocity = (static.own_at(start + x, v_d + half) - static.own_at(start + x, v_d - half)) / (2.0 * half)
     damping = 2.0 * np.abs(static.damped_velocity(state, x_pb, x))
     return DisturbanceSlopes(
-        friction,
-        2.0 * np.abs(x),
-        damping,
-        np.hstack([np.empty((len(x), 0)), *of_position]),
-        of_velocity,
+        friction, 2.0 * np.abs(x), damping, np.hstack([np.empty((len(x), 0)), *of_position]), of_velocity
     )
 
 

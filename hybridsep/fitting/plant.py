@@ -105,12 +105,11 @@ class _Piece:
 
 def _errors(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece]) -> list[Array]:
     """Return what was measured of each piece less the plant's position, ``(n,)``, m, with the sensor's offset."""
-    of_modes = []
+    of_modes, found = [], []
     for mode in plant.model.modes:
         theta, weights = np.log([mode.omega, mode.zeta]), np.array([mode.alpha / mode.omega**2, mode.beta / mode.omega])
         numerators, denominator = polynomials(theta, settings.T_s, settings.input_hold)
         of_modes.append((weights @ numerators, denominator))
-    found = []
     for one in pieces:
         disturbance = plant.f * np.tanh(one.v_d / plant.v_friction) + plant.kappa * one.path * np.abs(one.path)
         u = delayed(one.u - disturbance, plant.model.dead_time)

@@ -223,10 +223,8 @@ def write_moves(report: Report, judged: Judged, in_position: float) -> None:
     report.heading("Moves as recorded")
     settled = [1e3 * one.settling for one in moves if math.isfinite(one.settling)]
     times = f"{np.median(settled):.3g} ms in the median, {max(settled):.3g} ms at most" if settled else "none did"
-    report.paragraph(
-        f"Of {len(moves)} moves {len(settled)} settled within {judged.shown.words(in_position)} before the next: "
-        f"{times}."
-    )
+    within = judged.shown.words(in_position)
+    report.paragraph(f"Of {len(moves)} moves {len(settled)} settled within {within} before the next: {times}.")
     worst = sorted(moves, key=lambda one: -one.largest)[:5]
     report.table(
         ["begins [s]", "largest servo error", "settles [ms]"],
@@ -240,9 +238,8 @@ def write_findings(report: Report, logs: Sequence[Log], findings: Mapping[str, S
     remarks = [f"{log.path.name}: {remark}" for log in logs for remark in log.remarks]
     report.bullets(remarks)
     if not any(findings.values()):
-        report.paragraph(
-            f"Nothing{' else' if remarks else ''}: time axis, samples, signs, scales and motion are plausible."
-        )
+        other = " else" if remarks else ""
+        report.paragraph(f"Nothing{other}: time axis, samples, signs, scales and motion are plausible.")
     for log in (one for one in logs if findings.get(one.path.name)):
         rows = [[one.name, one.plain.partition(": ")[2]] for one in findings[log.path.name]]
         report.table([log.path.name, "note"], rows, words=1)
