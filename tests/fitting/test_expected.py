@@ -39,7 +39,8 @@ def test_fmu_and_library_leave_the_same(late: int, compensate: str, monkeypatch:
     with Trial.of(MACHINE) as trial:
         assert trial.fmu is None
         (by_library,) = trial.expected(*given)
-    np.testing.assert_allclose(by_fmu, by_library, rtol=0.0, atol=1e-11)
+    # its plans are longer than the preview: rounding grows further in them, and is far below the promised 1 nm
+    np.testing.assert_allclose(by_fmu, by_library, rtol=0.0, atol=1e-10)
     assert np.nanmax(np.abs(by_fmu.compensated[600:])) < 0.3 * np.nanmax(np.abs(by_fmu.without[600:]))
 
 
