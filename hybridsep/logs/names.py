@@ -83,7 +83,7 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
             (commanded if kinds[0] else measured).setdefault(axis, name)
             if is_position:
                 whole["x_d" if kinds[0] else "x"].append(name)
-    bare = {axis: name for name in names if (axis := stated_unit(name)[0]) in commanded}  # q beside q_des
+    bare = {axis: name for name in names[::-1] if (axis := stated_unit(name)[0]) and axis in commanded}  # q and q_des
     measured = {**bare, **positions, **measured}
     found = {axis: (x_d, measured[axis]) for axis, x_d in commanded.items() if axis in measured}
     # A compensation is added to what enters the position loop; what was planned is another instant's

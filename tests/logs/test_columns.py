@@ -105,6 +105,12 @@ def test_words_of_process_control_a_bare_axis_and_units_in_words(tmp_path: Path,
     np.testing.assert_allclose((*log.t, *log.x_d, *log.x_meas), (0, 1e-3, 0.0254, 0.0508, 0.0508, 0.0762))
 
 
+def test_row_labels_are_no_bare_axis(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "log.csv", ",t,target,theta\n0,0,1,2\n1,1,2,3\n")
+    with pytest.raises(LogError, match="columns 'x_d', 'x' are missing"):
+        read_log(path)
+
+
 @pytest.mark.parametrize("unit", ["cm", "0um", "furlong", 1e-3, b"mm", ["mm"]])
 def test_units_that_are_none(tmp_path: Path, unit: Any) -> None:
     path = write(tmp_path / "log.npz", columns())
