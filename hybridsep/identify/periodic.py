@@ -82,7 +82,7 @@ def _spectrum(s: Array, e: Array, lowest: float, width: float, n: int) -> Array:
     # The least squares' normal equations of cosine and sine
     total, c, d = float(len(s)), e_wave.real, e_wave.imag
     numerator = c**2 * (total - square.real) + d**2 * (total + square.real) - 2.0 * c * d * square.imag
-    return np.asarray(2.0 * numerator / (total**2 - np.abs(square) ** 2))
+    return np.asarray(2.0 * numerator / np.maximum(total**2 - np.abs(square) ** 2, 1e-9 * total**2))  # not 0 on a grid
 
 
 def _predicted(s: Array, known: Array, e: Array, line: float) -> float:
