@@ -267,7 +267,7 @@ class CompensatorSettings(Settings):
     """Parameters of the compensator, besides its predictor's.
 
     What is left out is in the drive's time: ``preview`` is what its model needs to follow
-    (:meth:`~hybridsep.model.physics.ModalModel.look_ahead`), ``spacing`` a hundredth of it, or the next smaller divisor
+    (:meth:`~hybridsep.model.physics.ModalModel.look_ahead`), ``spacing`` a hundredth of a plan, or a smaller divisor
     of ``Np``. The differences of ``x_dm`` keep the drive's ``limits``, if there are any; where those of ``x_d`` do not,
     by what these take more. ``no_reversal`` has no effect without them; with ``averaging`` it bounds the physics
     model's plan in the hybrid's stead alone. ``change_max``, None for no bound, is about twice the servo error

@@ -71,7 +71,7 @@ _HOW = (
 def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
     """Return the entries of ``[drive_limits]`` of options by their names; empty without any.
 
-    ParameterError if some of the three limits are missing; other entries are taken from the log then.
+    What of the others is left out follows from the log. ParameterError if some of the three limits are missing.
     """
     found = {entry: one.checked(given[one.name]) for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
     names = [parameter.name for parameter in Limits.parameters().values()]
