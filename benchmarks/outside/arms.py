@@ -1,7 +1,7 @@
 """Robot arms of MuJoCo, all joints at once: tracking errors off, with both models, and of a rival.
 
     pip install '.[benchmark]'
-    python -m benchmarks.outside.arms [ur5e panda] [--picture FILE]      (six minutes)
+    python -m benchmarks.outside.arms [ur5e panda] [--picture FILE]      (three minutes)
 
 Multibody models that others wrote: UR5e and Panda as the package robosuite ships them (MIT licence; Y. Zhu and others,
 "robosuite: A modular simulation framework and benchmark for robot learning", arXiv:2009.12293), integrated by MuJoCo
