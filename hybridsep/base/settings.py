@@ -327,7 +327,7 @@ class CompensatorSettings(Settings):
         """Return the samples of a plan for a drive that needs ``look_ahead``, of ``T_s``, s.
 
         A plan is back at the command at its end. Where the limits need more than half of it to take back the error of
-        an axis that lags, half of ``change_max``, it is longer by that, by as much as it is at most.
+        an axis that lags, half of ``change_max``, it is longer by what they need, and twice as long at most.
         """
         if self.limits is None or self.change_max is None:
             return look_ahead

@@ -56,7 +56,7 @@ class DisturbanceSlopes(NamedTuple):
         return DisturbanceSlopes(*(one[n:] for one in self))
 
     def change(self, weights: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
-        """Return what the disturbances change by, ``(n, m)``, with weights ``(n_disturbances,)``.
+        """Return what the disturbances change by, ``(n, m)``.
 
         ``weights``: (n_disturbances,); ``velocity``: (n, m), m/s: changes of the commanded velocity, each a column;
         ``moved``, ``moved_velocity``: (n, m), m and m/s: changes of the position, and of its velocity.

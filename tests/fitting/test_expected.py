@@ -21,9 +21,16 @@ MACHINE = machine_of(
 )
 
 
-@pytest.mark.parametrize(("late", "compensate"), [(0, "hybrid"), (3, "hybrid"), (0, "physics")])
-def test_fmu_and_library_leave_the_same(late: int, compensate: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a command 2 mm from zero, measured with friction and an offset, samples missing."""
+@pytest.mark.parametrize(
+    ("late", "compensate", "apart"), [(0, "hybrid", 1e-10), (3, "hybrid", 1e-11), (0, "physics", 1e-11)]
+)
+def test_fmu_and_library_leave_the_same(
+    late: int, compensate: str, apart: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a command 2 mm from zero, measured with friction and an offset, samples missing.
+
+    Plans are longer than the preview, in which rounding may grow further: to 3e-11 m in one, where 1 nm is promised.
+    """
     friction = 1e-5 * np.tanh(np.gradient(MOVES) / T_S / 1e-3)
     discrete = SERVO.discretise(T_S)
     x = discrete.forced_response(discrete.rest(), MOVES)[0] - friction + 0.00201
@@ -39,8 +46,7 @@ def test_fmu_and_library_leave_the_same(late: int, compensate: str, monkeypatch:
     with Trial.of(MACHINE) as trial:
         assert trial.fmu is None
         (by_library,) = trial.expected(*given)
-    # its plans are longer than the preview: rounding grows further in them, and is far below the promised 1 nm
-    np.testing.assert_allclose(by_fmu, by_library, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(by_fmu, by_library, rtol=0.0, atol=apart)
     assert np.nanmax(np.abs(by_fmu.compensated[600:])) < 0.3 * np.nanmax(np.abs(by_fmu.without[600:]))
 
 

@@ -55,11 +55,11 @@ class AveragingConstants:
     # weight of earlier runs, relative to the one they have, in the expert that doubts them: a prior from a tenth of a
     # window. Without any, changed plants are worse by an eighth
     warm_prior_weight: float = 0.003
-    # from which on earlier runs are forgotten: weight of that expert in the stack; mean square error of the one that
-    # led, relative to the largest of a window; and the product of the sums of squares that it has erred by more in this
-    # run, and of all residuals of the run, relative to the same: with a weight of 0.5 plants that have not changed are
-    # worse by 2 %; without an error a changed drive has to 5 times the error; without a product a creep before the
-    # first motion decides, and a rack has 1.3 times, warm, with 0.5 a changed drive 2.7 times
+    # Earlier runs are forgotten above all three. Weight of that expert in the stack: with 0.5 unchanged plants err
+    # 2 % more. Mean square error of the one that led, relative to the largest of a window: with 0 a changed drive has
+    # up to 5 times the error. Sum of squares that the leader errs by more in this run, times that of all its residuals,
+    # each relative to a window of the largest: with 0 a creep before the first motion decides, and a rack, warm, has
+    # 1.3 times the error; with 0.5 a changed drive has 2.7 times
     discard_above: float = 0.7
     discard_error: float = 0.003
     discard_harm: float = 0.1

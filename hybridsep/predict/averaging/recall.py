@@ -3,8 +3,8 @@
 Most axes repeat: a part program, a pick and place, a test signal. The memory has the commands as they came, and the
 residuals. For each lag ``τ`` a sum ``D_τ ← γ D_τ + (Δu(k) − Δu(k−τ))²`` of changes ``Δu`` over some samples follows how
 much the commands ahead, and those before them, are like those ``τ`` samples before; it fades in as many as are
-predicted. The lag with the least gives the residuals that were measured then, behind a compensator the shortest of
-those that are alike, as what the drive was told in place of the commands was most like now. They count by
+predicted. The lag with the least gives the residuals that were measured then. Behind a compensator it is the shortest
+of those that are alike: what the drive was told then is most like what it is told now. They count by
 ``1/(1 + (D_τ/S)/ρ²)``, with the same sum ``S`` of the changes themselves, and a tolerance ``ρ``.
 """
 
