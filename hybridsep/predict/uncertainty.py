@@ -36,7 +36,7 @@ _LEAST_SHARE, _MOST_SHARE = 1e-9, 1e4  # bounds on the variance relative to its 
 _THETA_LEAST = np.array([0.0, *(_LEAST_SHARE * share for share in _SHARES)])
 _THETA_MOST = np.array([PREDICTION_MAX, *(_MOST_SHARE * share for share in _SHARES)])
 
-_FLOOR = 1e-6  # least variance relative to the recent mean square of the residual
+_FLOOR = 1e-8  # least variance relative to the recent mean square of the residual
 _LEAST_VARIANCE = 1e-100  # variance, m², that no divisor is below
 
 _OUTLYING, _VANISHING = 16.0, 0.01
