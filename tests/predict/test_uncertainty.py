@@ -56,6 +56,13 @@ def test_white_noise_of_any_size_is_known_after_a_second(std: float) -> None:
     assert float(np.sqrt(np.mean(predicted**2))) == pytest.approx(std, rel=0.15)
 
 
+def test_an_error_far_below_the_residual_is_known() -> None:
+    uncertainty = Uncertainty.init(1e-12)
+    for errors in np.random.default_rng(8).normal(0.0, 1.5e-7, (60, N)):
+        uncertainty = uncertainty.learn(window(uncertainty, e_h=1e-3), 1e-3 + errors, ALL, N)
+    np.testing.assert_allclose(window(uncertainty, e_h=1e-3).std, 1.5e-7, rtol=0.25)
+
+
 def test_before_the_first_window_it_is_the_assumed_noise_and_what_the_model_knows() -> None:
     uncertainty = Uncertainty.init(4e-12)
     np.testing.assert_allclose(window(uncertainty).std, 2e-6, rtol=0.1)
