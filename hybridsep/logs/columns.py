@@ -9,17 +9,23 @@ import numpy as np
 
 from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
-from .names import ROLES, axes_of, known_names, signals_of
+from .names import ROLES, axes_of, has_word, known_names, signals_of
 from .source import Block, Source, sample_number
 from .text import is_number, stamp_kind
 from .times import COUNTED
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
-_COUNTS = ("count", "counts", "cts", "inc", "incr", "increment", "increments", "pulse", "pulses")
+_COUNTS = (
+    "count", "counts", "cts", "cnt", "qc", "inc", "incr", "inkr", "increment", "increments", "pulse", "pulses", "tick",
+    "ticks", "lu", "puu", "step", "steps",
+)  # fmt: skip
 """Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
+
+_OTHERS = re.compile(r"/|rpm|min-1|hz|%", re.IGNORECASE)  # in units of what is no position; another one may be given
 
 _ROW_LABELS = ("", "index", "__index_level_0__", "Unnamed: 0")  # names that pandas and Arrow give an index in a file
 
+_DATA = re.compile(r"(\.(data|values?|signals))+$", re.IGNORECASE)  # names of what MATLAB has beside a signal's time
 _GAP = 1.5  # intervals of the slower column between two samples of the faster one from which on the latter has a gap
 _SAME = 1e-6  # largest difference of two channels' times, in intervals, at which they are the same: rounding
 
@@ -51,7 +57,7 @@ def choose_columns(
     chosen, remarks = _positions(source, given, axis)
     time = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
     if time is None and "t" not in given:
-        time = _only_clock(source)
+        time = _only_time(source)
         if time is not None and not time_needed and not (_steps(source, time) > 0.0).any():
             time = None  # that of an export
         if time is not None:
@@ -60,6 +66,8 @@ def choose_columns(
             time = _row_labels(source)
     if time is not None or "t" in given or time_needed:
         chosen = {"t": time, **chosen}
+    speeds = [name for role, name in chosen.items() if role != "t" and name and has_word("velocity", name)]
+    remarks = [*remarks, *(f"column {brief(name)} is called a velocity, and read as a position" for name in speeds)]
     source.remarks = [*source.remarks, *remarks]
     found: dict[str, Column] = {}
     names = {role: name for role, name in chosen.items() if name is not None}
@@ -152,23 +160,27 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
     if role in source.roles:
         return source.roles[role]
     known = known_names(role, source.names)
+    if not known and not (source.axes or axes_of(source.names)):  # in structs, log.x_d, or timeseries, log.x_d.Data
+        ends = {name: _DATA.sub("", name).rpartition(".")[2] for name in source.names}
+        known = [name for name in source.names if ends[name] in known_names(role, list(ends.values()))]
     if len(set(known)) > 1:
         raise LogError(f"{source.path}: column {role} may be {listed(known)}; name it: --{role} NAME")
     return known[0] if known else None
 
 
-def _only_clock(source: Source) -> str | None:
-    """Return the only column of timestamps, whatever its name; None if there are none or several."""
+def _only_time(source: Source) -> str | None:
+    """Return the only column of timestamps, whatever its name, or the only one called a time; None without one."""
     twins = {twin for one in source.twins.values() for twin in one}
     clocks = [name for name in source.names if name in source.stamps and name not in twins]
-    return clocks[0] if len(clocks) == 1 else None
+    called = [name for name in source.names if has_word("t", name) and np.sign(_steps(source, name)).sum() > 0]
+    return next((some[0] for some in (clocks, called) if len(some) == 1), None)
 
 
 def _steps(source: Source, name: str) -> Array:
     """Return the differences of a column, ``(n - 1,)``, none where it does not hold numbers."""
     with suppress(LogError):
         return np.diff(source.read([name]).columns[0])
-    return np.empty(0)
+    return np.zeros(1)
 
 
 def _row_labels(source: Source) -> str | None:
@@ -202,7 +214,12 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     of_python = f"; in Python by columns={{{', '.join(f'{role!r}: NAME' for role in names)}}}"
     of_python += ", or T_s=SECONDS" if "t" in names else ""
     there = f"{which} missing, the file has {listed(source.names)}"
-    return LogError(f"{source.path}: {there}; name {it}: {options}{of_python}")
+    errors, speeds = ([name for name in source.names if has_word(kind, name)] for kind in ("error", "velocity"))
+    instead = "" if set(names) == {"t"} else "; velocities are none: record positions" if speeds and not errors else ""
+    if errors and not instead and set(names) != {"t"}:
+        what = "an error alone tells no command" if len(names.keys() - {"t"}) > 1 else "or write it into the file"
+        instead = f"; {what}: x = x_d − {brief(errors[0])}, plus where that is x − x_d"
+    return LogError(f"{source.path}: {there}; name {it}: {options}{of_python}{instead}")
 
 
 def _stated(source: Source, name: str) -> str:
@@ -213,7 +230,7 @@ def _stated(source: Source, name: str) -> str:
 def _time(source: Source, name: str) -> Column:
     if name in source.stamps:
         return Column(name, TIME_UNITS["s"], True)  # whatever is stated, such as hh:mm:ss or UTC
-    text = _stated(source, name)
+    text = _stated(source, name) or (name if len(name) > 3 and time_unit(name) else "")  # millis
     unit = time_unit(text) if text else TIME_UNITS["s"]
     if unit is None:
         raise LogError(
@@ -231,7 +248,7 @@ def _position(source: Source, name: str, given: str | None) -> Column:
         )
     text = _stated(source, name)
     unit = position_unit(text) if text else None
-    counts = plain_name(text) in _COUNTS
+    counts = plain_name(text) in _COUNTS or (given is not None and unit is None and not _OTHERS.search(text))
     if counts and given is None:
         raise LogError(
             f"{source.path}: column {brief(name)} is in encoder counts; give the length of one, such as unit='0.1um' "
@@ -240,7 +257,7 @@ def _position(source: Source, name: str, given: str | None) -> Column:
     if text and unit is None and not counts:
         raise LogError(
             f"{source.path}: column {brief(name)} must be a position in one of {', '.join(POSITION_UNITS)}, its unit "
-            f"is {brief(text)}; is it another quantity? Name another column (--x_d NAME, --x NAME), or correct the unit"
+            f"is {brief(text)}; is it another quantity? Name another column (--x_d NAME, --x NAME), or give it (--unit)"
         )
     chosen = position_unit(given) if given is not None else None
     if unit is not None and chosen not in (None, unit):
@@ -271,7 +288,7 @@ def channels(source: Source) -> list[_Channel]:
     with suppress(LogError):
         x_d = next((name for name, role in roles.items() if role == "x_d"), None)
         known = _time_of(source, x_d or "")
-        roles[_only_clock(source) if known is None else known] = "t"
+        roles[_only_time(source) if known is None else known] = "t"
     units = {**source.assumed_units, **source.units}
     return [_Channel(name, units.get(name) or stated_unit(name)[1], roles.get(name, "")) for name in source.names]
 

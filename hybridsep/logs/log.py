@@ -169,6 +169,8 @@ def read_log(
     chosen = {**chosen, **signal_columns(source, chosen)}
     block, resampling = side_by_side(source, chosen, resample=resample)
     read, repeats = _without_repeats(_checked(path, block, chosen))
+    if "t" in read:
+        _check_alternation(path, read["t"], read["x_d"])
     own = {what: chosen[what].unit.factor * read[what] for what in SIGNALS if what in chosen}
     signals = {what: values for what, values in own.items() if not np.isnan(values).all()}
     x_d, x_meas = (chosen[role].unit.factor * read[role] for role in ("x_d", "x"))
@@ -245,6 +247,13 @@ def _without_repeats(read: dict[str, Array]) -> tuple[dict[str, Array], str]:
     return {role: np.delete(one, repeats) for role, one in read.items()}, said
 
 
+def _check_alternation(path: Path, t: Array, x_d: Array) -> None:
+    """Raise LogError if rows of several axes follow each other: times repeat, and commands are as some rows before."""
+    k = round(len(t) / (np.count_nonzero(np.diff(t)) + 1))
+    if 1 < k < len(t) and np.abs(x_d[k:] - x_d[:-k]).sum() < _ALTERNATES * np.abs(np.diff(x_d)).sum():
+        raise LogError(f"{path}: rows of {k} axes follow each other; write those of one into a file of their own")
+
+
 def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, str]) -> Iterator[str]:
     """Yield a remark if a column of positions was recognised by a name other than the library's own."""
     known = {*_OWN_NAMES, *(name for pair in source.axes.values() for name in pair)}
@@ -291,6 +300,8 @@ _TURN = 2 * math.pi
 
 _JUMP = 3.0  # largest difference of a jump from a whole turn, in the largest steps that are no jumps
 _WITHIN = 1.05  # largest range, in turns, of a position modulo one turn with its noise
+
+_ALTERNATES = 0.2  # way of a command over as many rows as there are axes, relative to that from row to row
 
 _ONE_PHASE, _CHANGES = 0.95, 50
 """Share of a slow sensor's changes that come in one sample of every n, which no other log of a hundred reached for any

@@ -18,7 +18,7 @@ planned, that which enters the position loop, later and interpolated, the measur
 its deviation from the contour."""
 
 _NAMES: Mapping[str, tuple[str, ...]] = {
-    "t": ("t", "time", "timestamp", "time_stamp", "sec", "seconds", "epoch", "zeit"),
+    "t": ("t", "time", "timestamp", "time_stamp", "sec", "seconds", "epoch", "zeit", "millis", "micros"),
     "x_d": (
         "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "set_point", "command",
         "commanded", "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "ctrl_pos",
@@ -34,14 +34,27 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 
 _SOLL, _IST = {"sollposition", "solllage", "lagesollwert"}, {"istposition", "istlage", "lageistwert"}
 _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "sp", "des", "desired", "target"}
-_COMMANDED |= {"soll", *_SOLL}
+_COMMANDED |= {"commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"}
 _MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "pv", "ist"} | _IST
-_POSITION = {"pos", "position", "positions", "lage"} | _SOLL | _IST
-"""Words within names, in small letters; what is left of a name beside them and the word axis is the axis."""
+_MEASURED |= {"estimate", "estimated", "mesure", "istwert"}
+_POSITION = {"pos", "position", "positions", "lage", "angle", "pl", "pctrl", "pulses"} | _SOLL | _IST
+_COMMANDED |= _SOLL
+_FILLING = {"axis", "value", "values", "data", "state", "states", "current"}
+_SENT = {"control", "input"}  # commanded beside a word for the position, else a controller's output
+_VELOCITY = {"vel", "velo", "velocity", "velocities", "speed", "speeds", "geschwindigkeit"}
+_ERROR = {"error", "err", "errors", "diff", "posdiff", "deviation", "droop", "schleppfehler", "schleppabstand"}
+_NO_POSITION = _VELOCITY | _ERROR | {"acc", "acceleration", "accelerations", "jerk", "torque", "frequency"}
+_TIME = {"time", "timestamp", "zeit", "zeitstempel", "temps"}
+"""Words within names, in small letters; what is left of a name beside those of positions and what fills is the axis."""
+
+_SHORT = {"rpos": "ref pos", "fpos": "fb pos", "pcmd": "pos cmd", "posf": "pos fb", "s": "pos"}
+_WHOLE = re.compile(r"(?<![a-z])(rpos|fpos|pcmd|posf|^s(?=[ _](?:noml|act)))(?![a-z])|\(?0x[\da-f]+\)?", re.IGNORECASE)
+"""Whole words of ACS, Fanuc and Heidenhain that stand for two; and numbers of CANopen's objects, which say nothing."""
 
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|\W")
 _POS = re.compile(r"(?<=[a-z\d])(pos)(?![a-z])", re.IGNORECASE)
-_AXIS = re.compile(r"[xyzabcq]?_?\d*", re.IGNORECASE)
+_AXIS = re.compile(r"([xyzabcq]|theta|phi|psi)?_?\d*", re.IGNORECASE)
+_ACTUAL = re.compile(r"(?<=\.)Actual(?=Position)")
 _COLUMN = re.compile(r"\[(\d+)\]$")
 """Names of axes that need no word for the position beside them: x_cmd is one, v_cmd a velocity; ``q[0]`` is a matrix's
 first column."""
@@ -67,29 +80,34 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     measured: dict[str, str] = {}
     positions: dict[str, str] = {}  # of columns that say nothing else, joint_pos_1 beside joint_pos_target_1
     whole: dict[str, list[str]] = {"x_d": [], "x": []}
-    for name in names:
+    for name in sorted(names, key=lambda one: "target" in one.lower()):  # that of a whole move, where there is another
         if column := _COLUMN.search(stated_unit(name)[0]):  # of a matrix that is called x_d
             known = [_spelling(name[: column.start()]) in _NAMES[role] for role in ("x_d", "x")]
             if any(known):
                 (commanded if known[0] else measured).setdefault(column[1], name)
                 continue
-        words = [token.lower() for token in _tokens(name)]
-        axis = _axis(name)
-        is_position = any(word in _POSITION for word in words)
-        kinds = [any(word in known for word in words) for known in (_COMMANDED, _MEASURED)]
+        words, axis = {token.lower() for token in _tokens(name)}, _axis(name)
+        if words & _NO_POSITION:
+            continue
+        is_position = not words.isdisjoint(_POSITION)
+        kinds = [bool(words & known) for known in (_COMMANDED | _SENT if is_position else _COMMANDED, _MEASURED)]
         if not any(kinds) and is_position:
             positions.setdefault(axis, name)
         elif sum(kinds) == 1 and (is_position or _AXIS.fullmatch(axis)):
             (commanded if kinds[0] else measured).setdefault(axis, name)
             if is_position:
                 whole["x_d" if kinds[0] else "x"].append(name)
+    for axis, name in measured.items():  # a PLC's Axis.Position and Axis.ActualPosition
+        if (own := _ACTUAL.sub("", name)) != name and own in names:
+            commanded.setdefault(axis, own)
     bare = {axis: name for name in names[::-1] if (axis := stated_unit(name)[0]) and axis in commanded}  # q and q_des
     measured = {**bare, **positions, **measured}
     found = {axis: (x_d, measured[axis]) for axis, x_d in commanded.items() if axis in measured}
     # A compensation is added to what enters the position loop; what was planned is another instant's
     found = {axis: (signals_of(names, x).get("loop_command", x_d), x) for axis, (x_d, x) in found.items()}
-    if not found and [len(names) for names in whole.values()] == [1, 1]:  # the only ones, whatever their axis
-        return {"": (whole["x_d"][0], whole["x"][0])}
+    only = whole["x_d"], whole["x"] or list(positions.values())
+    if not found and [len(names) for names in only] == [1, 1]:  # whatever their axis
+        return {"": (only[0][0], only[1][0])}
     return found
 
 
@@ -106,15 +124,21 @@ def _axis(name: str) -> str:
     for token in _tokens(name):
         if not token.isalnum():
             gap = gap or ("_" if token == " " else token)
-        elif token.lower() not in _COMMANDED | _MEASURED | _POSITION | {"axis"}:
+        elif token.lower() not in _COMMANDED | _SENT | _MEASURED | _POSITION | _FILLING:
             left, gap = f"{left}{gap if left else ''}{token}", ""
     return left
 
 
 def _tokens(name: str) -> list[str]:
     """Return words, numbers and signs of a name without its unit; ``_`` is a blank, ``XPOS`` two words."""
-    return _TOKEN.findall(_POS.sub(r" \1", _COLUMN.sub(r" \1", stated_unit(name)[0]).replace("_", " ")))
+    plain = _WHOLE.sub(lambda one: _SHORT.get(one[0].lower(), ""), stated_unit(name)[0])
+    return _TOKEN.findall(_POS.sub(r" \1", _COLUMN.sub(r" \1", plain).replace("_", " ")))
+
+
+def has_word(kind: str, name: str) -> bool:
+    """Return whether a name has a word of a time, a velocity or an error."""
+    return not {"t": _TIME, "velocity": _VELOCITY, "error": _ERROR}[kind].isdisjoint(map(str.lower, _tokens(name)))
 
 
 def _spelling(name: str) -> str:
-    return name.strip().lower().replace(" ", "_").replace("-", "_").replace(".", "_")
+    return name.strip(" _").lower().replace(" ", "_").replace("-", "_").replace(".", "_")

@@ -29,12 +29,14 @@ from .source import Block, Source, past_midnights
 from .units import plain_name, position_unit, time_unit
 
 _HEAD_LINES = 1000  # lines, blank ones aside, in which names and numbers must begin
+_PREAMBLE = 3  # fewer rows of numbers are a preamble's, where there are more
 _BLOCK = 10_000  # lines that are converted at once
 
 _COMMENTS = ("#", "%", "//", "!")
 """Beginnings of a comment line."""
 
 _DELIMITERS = (";", "\t", ",", None)  # delimiters by precedence; None is blanks
+_UNIT_ROWS = ("unit", "units", "einheit", "einheiten", "y_unit_label")  # first cells of rows of units
 _NO_UNITS = ("", "-", "1", "[-]")  # entries of a row of units where a column has none
 _BLANK = -math.inf  # stands for a blank cell of the command until it is filled
 
@@ -58,6 +60,7 @@ _ONE_DATE = r"""
     | \d{8}                                                 # 20260305, before a time of day
     | \d{1,2} [-/.] \d{1,2} [-/.] (?: \d{4} | \d{2} )       # 05.03.2026, 3/5/26
     | \d{1,2} [-\ ] [A-Za-z]{3} [-\ ] \d{4}                 # 05-Mar-2026
+    | \d+\ days?                                           # 0 days 00:00:00.001, of pandas
 """
 
 _DATE = re.compile(rf"[\s'\"]* (?: {_ONE_DATE} ) [\s'\"]*", re.VERBOSE)
@@ -65,7 +68,8 @@ _DATE = re.compile(rf"[\s'\"]* (?: {_ONE_DATE} ) [\s'\"]*", re.VERBOSE)
 _STAMP = re.compile(
     rf"""[\s'"]*
     (?P<date> (?: {_ONE_DATE} ) (?: [Tt_-] | [.,]?\s+ ) )?
-    (?P<hour>[01]?\d|2[0-3]) : (?P<minute>[0-5]\d) : (?P<second>[0-5]\d) (?: [.,] (?P<fraction>\d{{1,9}}) )?
+    (?P<hour>[01]?\d|2[0-3]) : (?P<minute>[0-5]\d) : (?P<second>[0-5]\d)
+    (?: (?: [.,] | :(?=\d{{3}}\b) ) (?P<fraction>\d{{1,9}}) )?
     (?: \s* (?P<half>[AaPp]) \.? [Mm] \.? )?
     (?: \s* (?: [Zz] | UTC | GMT | (?:UTC|GMT)? [+-] \d\d (?: :? \d\d )? ) )?
     [\s'"]*""",
@@ -120,6 +124,7 @@ class TextSource(Source):
         self.units = table.units | {
             twin: table.units[name] for name, twins in self.twins.items() if name in table.units for twin in twins
         }
+        self.roles = {"t": "X_Value"} if self.names[0] == "X_Value" else {}
         self.stamps = frozenset(self.names[i] for i in table.clocks)
         self._left_out: list[tuple[int, str]] = []
         self._held = 0
@@ -359,7 +364,7 @@ def _hint(field: str, comma: str | None) -> str:
 def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
     """Return the table of a file that begins with these lines, numbered from 1; None if they are all comments.
 
-    Of the delimiters that which gives most rows of numbers below names counts, then that with most columns. Where there
+    Of the delimiters that which gives most rows of numbers in a row counts, then that with most columns. Where there
     is none, the first line that is no comment is taken for the names, so that the reader's message names what is wrong
     below it.
     """
@@ -369,10 +374,11 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
         widths = [0 if line.lstrip().startswith(_COMMENTS) else _width(fields) for _, fields, line in rows]
         edges = [i for i, (before, now) in enumerate(pairwise([0, *widths, 0])) if now != before]
         for width in {*widths} - {0}:
-            runs = (run for run in pairwise(edges) if widths[run[0]] == width)
+            runs = [run for run in pairwise(edges) if widths[run[0]] == width]
+            runs.sort(key=lambda run: run[1] - run[0] < _PREAMBLE)
             found = (_with_names(rows, *run, delimiter) for run in runs)
             if (table := next(filter(None, found), None)) is not None:
-                n = sum(one == width and row[0] >= table.first for one, row in zip(widths, rows, strict=True))
+                n = max(end - start for start, end in runs if rows[start][0] >= table.first)
                 # That blanks divide a timestamp makes no column
                 tables.append(((n, width - (delimiter is None and bool(table.clocks))), table))
     if tables:
@@ -417,11 +423,16 @@ def _with_names(
             break
     if not above:
         return None
+    keyed = next((row for _, row in above[:9] if row[0].casefold() in _UNIT_ROWS), None)  # a row that is called so
     numeric = [i for i in range(len(above[0][1])) if not kinds[i]]  # hh:mm:ss may stand above timestamps
     has_units = len(above) > 1 and _is_row_of_units([above[0][1][i] for i in numeric])
     nearest = above[has_units:][:2]  # the one with more known names counts
     header, names = max(nearest, key=lambda row: n_known(row[1]) if len(row[1]) == len(nearest[0][1]) else -1)
-    units = dict(zip(names, above[0][1], strict=False)) if has_units else {}
+    units = (
+        dict(zip(names, above[0][1], strict=False))
+        if has_units
+        else dict(zip(names[1:], (keyed or [])[1:], strict=False))
+    )
     comma, settled = _comma_of([[row[i] for row in fields] for i in range(width)])
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
@@ -476,6 +487,8 @@ def _names(line: str, delimiter: str | None) -> list[str]:
     line = line.strip(" \r\n")
     for mark in _COMMENTS:
         line = line.removeprefix(mark)
+    if line.startswith("X_Value"):  # of LabVIEW
+        line = line.removesuffix("\tComment")
     return split(line.strip(" "), delimiter)
 
 

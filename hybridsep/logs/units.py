@@ -85,10 +85,10 @@ _SPELLINGS = {
         "in": 'inch "',
         "deg": "° degree degrees",
         "rad": "radian radians",
-        "rev": "turn turns revolution",
+        "rev": "turn turns revolution revolutions rot",
         "s": "sec second seconds",
-        "ms": "msec",
-        "us": "usec",
+        "ms": "msec millis",
+        "us": "usec micros",
     }.items()
     for spelling in spellings.split()
 }
@@ -100,7 +100,7 @@ _SPELLINGS |= {
 }
 """Other spellings, in small letters, of the units' names; µ is u."""
 
-_SUFFIXES = {"mm", "um", "nm", "inch", "meter", "rad", "mrad", "urad", "deg", "s", "ms", "us", "ns"}
+_SUFFIXES = {"mm", "um", "nm", "inch", "meter", "rad", "mrad", "urad", "deg", "s", "ms", "us", "ns", "counts", "ticks"}
 """Units that end a name after an underscore or a comma; m is none, as ``x_m`` is rather the measured position."""
 
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
@@ -146,13 +146,13 @@ def stated_unit(name: str) -> tuple[str, str]:
     """Return a column's name without its unit, and the unit as it is written, empty if it states none.
 
     ``x [mm]``, ``x (mm)``, ``x / mm``, ``x in mm``, ``x, mm`` and ``x_mm`` are ``("x", "mm")``. In square brackets any
-    text is a unit, but for the number of a matrix's column, ``q[0]``, and anywhere a known one divided by another, as
-    in ``v (mm/s)``; otherwise only a known one.
+    text is a unit, but for the number of a matrix's column, ``q[0]`` or ``q(0)``, and anywhere a known one divided by
+    another, as in ``v (mm/s)``; otherwise only a known one.
     """
     brackets = _BRACKETS.match(name)
     if brackets:
         square, text = brackets["square"], brackets["square"] or brackets["round"] or ""
-        if (square or "").isdigit() and name[len(brackets["name"])] == "[":
+        if text.isdigit() and name[len(brackets["name"])] in "[(":
             return name, ""
         if text.strip() in ("", "-", "1"):
             return brackets["name"], ""

@@ -94,10 +94,18 @@ def test_version_4_of_matlab(tmp_path: Path) -> None:
 
 
 def test_structs(tmp_path: Path) -> None:
-    io.savemat(tmp_path / "log.mat", {"rec": columns(), "name": "axis"})
-    refused(r"are missing, the file has 'rec\.t', 'rec\.x_d', 'rec\.x', 'name'", tmp_path / "log.mat")
-    names = {role: f"rec.{role}" for role in ("t", "x_d", "x")}
-    assert len(read_log(tmp_path / "log.mat", columns=names).t) == 50
+    """One of columns; two; Simulink's with time; timeseries."""
+    data, path = columns(), tmp_path / "log.mat"
+    signals = np.zeros((1, 2), [("values", "O"), ("label", "O")])
+    signals[0, 0], signals[0, 1] = (data["x_d"], "x_d"), (data["x"], "x")
+    series = {role: {"Time": data["t"], "Data": data[role]} for role in ("x_d", "x")}
+    for one in ({"rec": data, "name": "axis"}, {"rec": {"time": data["t"], "signals": signals}}, {"rec": series}):
+        io.savemat(path, one)
+        log = read_log(path)
+        np.testing.assert_array_equal((log.t, log.x_d, log.x_meas), [data[role] for role in ("t", "x_d", "x")])
+    io.savemat(path, {"run1": data, "run2": data})
+    refused(r"column x_d may be 'run1\.x_d', 'run2\.x_d'; name it: --x_d NAME", path)
+    assert len(read_log(path, columns={"x_d": "run2.x_d", "x": "run2.x"}).t) == 50
 
 
 def test_complex_vectors_are_two_columns(tmp_path: Path) -> None:

@@ -54,6 +54,10 @@ TWO_ROWS = "0,1,2\n1,3,4\n"
         "Time [s],Position Commanded [mm],Position Actual [mm]\n0,1000,2000\n1,3000,4000\n",
         "Timestamp,POS_CMD,POS_ACT\n" + TWO_ROWS,
         "t,x_d,x,x_m\n0,1,2,9\n1,3,4,9\n",
+        "Elapsed Time (ms),cycle_time,x_d,x\n0,7,1,2\n1000,7,3,4\n",
+        "millis,target_position,current_position\n0,1,2\n1000,3,4\n",
+        # Rows with a key
+        "Name;Zeit;Soll;Ist\nEinheit;ms;mm;mm\n;0;1000;2000\n;1000;3000;4000\n",
     ],
 )
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "latin-1", "utf-16"])
@@ -90,11 +94,27 @@ def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
         ),
         ("t,x_d,x\n0,0,0\n1,0,0,0\n", "line 3: 3 columns were expected as in line 1, got 4"),
         (f't,x_d,x\n0,0,"{"a" * 200_000}"\n', "line 2: column 'x' must be a number, got 'aaa"),
+        (
+            "t,pos_act,pos_err\n0,1,2\n",
+            r"name it: --x_d .*; or write it into the file: x = x_d − 'pos_err', plus where",
+        ),
+        ("t,pos_err\n0,1\n", "an error alone tells no command"),
+        ("t,vel_cmd,vel_act\n0,1,2\n", r"columns 'x_d', 'x' are missing, .*; velocities are none: record positions$"),
+        ("t,axis,x_d,x\n" + "".join(f"{k // 2},{'XY'[k % 2]},{k % 2},0\n" for k in range(9)), "rows of 2 axes follow"),
         ("t,x_d,x\n0;0;0\n", "line 2: column 't' must be a number, got '0;0;0'"),
     ],
 )
 def test_refused_texts(tmp_path: Path, text: str, message: str) -> None:
     refused(message, write_csv(tmp_path / "log.csv", text))
+
+
+def test_a_preamble_with_numbers_and_a_key_for_units(tmp_path: Path) -> None:
+    """As LabVIEW writes it."""
+    head = "LabVIEW Measurement\t\nReader_Version\t2\n***End_of_Header***\t\nChannels\t2\t\t\t\nSamples\t9\t9\t\t\n"
+    head += "Y_Unit_Label\tmm\tmm\t\nX0\t0.0\t0.0\t\nDelta_X\t0.5\t0.5\t\n***End_of_Header***\t\t\t\n"
+    rows = "".join(f"{k / 2:.3f}\t{k}.0\t{k}.5\n" for k in range(9))
+    log = read_log(write_csv(tmp_path / "log.lvm", f"{head}X_Value\tCommand\tActual\tComment\n{rows}"))
+    assert (log.T_s, log.file_unit, log.columns, log.x_meas[1]) == (0.5, "mm", ("Command", "Actual"), 1.5e-3)
 
 
 def test_latin_1_far_down(tmp_path: Path) -> None:
