@@ -32,35 +32,24 @@ _DEBUG_VARIABLE = "HYBRIDSEP_DEBUG"  # environment variable: if it is set, an un
 _WANTED = {"int": "must be a whole number", "float": "must be a number"}
 """What an option takes, by the beginning of a type of typer's errors."""
 
-EXAMPLES = {
-    "fit": (
-        "hybridsep fit my_axis.csv --Np 100",
-        "hybridsep fit my_axis.csv --unit mm --v_max 0.25 --a_max 20 --j_max 1e4",
-    ),
-    "init": ("hybridsep init machine.toml", "hybridsep init --force"),
-    "demo": ("hybridsep demo --out demo", "hybridsep demo --out demo --force"),
-    "build": (
-        "hybridsep build -m my_axis/machine.toml --out dist",
-        "hybridsep build HybridPredictor_my_axis -m my_axis/machine.toml --weights my_axis/trained.state",
-    ),
-    "cosim": (
-        "hybridsep cosim -m my_axis/machine.toml --compensate hybrid",
-        "hybridsep cosim x/machine.toml y/machine.toml --path part.ngc --figure part.png",
-    ),
-    "system": (
-        "hybridsep system -m my_axis/machine.toml --compensate hybrid",
-        "hybridsep system --ssp 2 --target host",
-    ),
+_ARGUMENTS = {
+    "fit": ("my_axis.csv --Np 100", "my_axis.csv --unit mm --v_max 0.25 --a_max 20 --j_max 1e4"),
+    "init": ("machine.toml", "--force"),
+    "demo": ("--out demo", "--out demo --force"),
+    "build": ("{m} --out dist", "HybridPredictor_my_axis {m} --weights my_axis/trained.state"),
+    "cosim": ("{m} --compensate hybrid", "x/machine.toml y/machine.toml --path part.ngc --figure part.png"),
+    "system": ("{m} --compensate hybrid", "--ssp 2 --target host"),
     "backtest": (
-        "hybridsep backtest my_axis.csv -m my_axis/machine.toml --set predictor.p=20 --figure errors.png",
-        "hybridsep backtest my_axis.csv -m my_axis/machine.toml --report today.html --save trained.state",
+        "my_axis.csv {m} --set predictor.p=20 --figure errors.png",
+        "my_axis.csv {m} --report today.html --save trained.state",
     ),
-    "hal": ("hybridsep hal my_axis/machine.toml --out hal", "hybridsep hal x/machine.toml y/machine.toml --out hal"),
-    "header": (
-        "hybridsep header my_axis/machine.toml --predictor",
-        "hybridsep header my_axis/machine.toml --predictor --weights my_axis/trained.state",
-    ),
-    "example-log": ("hybridsep example-log --out my_axis.csv", "hybridsep example-log --out my_axis.csv.gz"),
+    "hal": ("my_axis/machine.toml --out hal", "x/machine.toml y/machine.toml --out hal"),
+    "header": ("my_axis/machine.toml --predictor", "my_axis/machine.toml --predictor --weights my_axis/trained.state"),
+    "example-log": ("--out my_axis.csv", "--out my_axis.csv.gz"),
+}
+EXAMPLES = {
+    name: [f"hybridsep {name} {one}".format(m="-m my_axis/machine.toml") for one in lines]
+    for name, lines in _ARGUMENTS.items()
 }
 """Two lines for each command."""
 

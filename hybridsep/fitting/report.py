@@ -6,7 +6,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 from ..base.metrics import coverage, moves_of
 from ..base.signals import Array
@@ -45,7 +44,6 @@ def begun_report(title: str, logs: Sequence[Log], judged: Judged, heading: str, 
     if not np.isnan(judged.replay.errors()[0]).all():  # else nothing judges
         _write_time(report, judged)
         _write_horizon(report, judged)
-        _write_spectra(report, judged)
     return report
 
 
@@ -199,19 +197,6 @@ def _write_horizon(report: Report, judged: Judged) -> None:
     lines = [Line(name, ahead, row, colour) for name, row, colour in zip(_NAMES, horizon, _COLOURS, strict=True)]
     how = "How the error grows from the window's first sample on."
     report.chart(Chart("ahead [ms]", (f"RMS error [{unit}]",), lines, how))
-
-
-def _write_spectra(report: Report, judged: Judged) -> None:
-    scale, unit = judged.unit
-    errors = judged.replay.errors()
-    errors = errors[:, ~np.isnan(errors[0])]
-    if errors.shape[1] < 64:
-        return
-    f, power = welch(errors, 1.0 / judged.T_s, nperseg=min(2048, errors.shape[1]))
-    amplitude: Array = scale * np.sqrt(power)
-    lines = [Line(name, f[1:], row[1:], colour) for name, row, colour in zip(_NAMES, amplitude, _COLOURS, strict=True)]
-    report.heading("Spectra of the errors")
-    report.chart(Chart("frequency [Hz]", (f"density [{unit}/√Hz]",), lines, x_log=True, y_log=True))
 
 
 def write_moves(report: Report, judged: Judged, in_position: float) -> None:

@@ -5,8 +5,6 @@ Beside them lies the example log of the package, made by ``examples/example_log.
 """
 
 import gzip
-import zlib
-from contextlib import suppress
 from pathlib import Path
 
 from ..base.errors import LogError
@@ -84,10 +82,6 @@ def open_source(path: Path) -> Source:
             raise LogError(f"{path}: there is no such file" if not path.exists() else f"{path}: is not a file")
         with path.open("rb") as file:
             head = file.read(_HEAD)
-        if head.startswith(b"\x1f\x8b"):
-            with gzip.open(path) as file, suppress(gzip.BadGzipFile, EOFError, zlib.error):
-                if file.read(1) in (b"{", b"[", b"<", b"\x89"):
-                    raise LogError(f"{path}: is no text in gzip; unpack it")
         if not head:
             raise LogError(f"{path}: the file is empty")
         return _reader(path, head)(path)

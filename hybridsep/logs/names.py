@@ -53,7 +53,7 @@ _WHOLE = re.compile(r"(?<![a-z])(rpos|fpos|pcmd|posf|^s(?=[ _](?:noml|act)))(?![
 
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|\W")
 _POS = re.compile(r"(?<=[a-z\d])(pos)(?![a-z])", re.IGNORECASE)
-_AXIS = re.compile(r"([xyzabcq]|theta|phi|psi)?_?\d*", re.IGNORECASE)
+_AXIS = re.compile(r"([xyzabcqj]|joint|theta|phi|psi)?_?\d*", re.IGNORECASE)
 _ACTUAL = re.compile(r"(?<=\.)Actual(?=Position)")
 _COLUMN = re.compile(r"\[(\d+)\]$")
 """Names of axes that need no word for the position beside them: x_cmd is one, v_cmd a velocity; ``q[0]`` is a matrix's

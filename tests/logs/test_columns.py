@@ -85,17 +85,8 @@ def test_columns_in_a_struct_are_guessed_beside_those_that_are_named(tmp_path: P
         assert named.columns[left[1]] == left[0]
 
 
-@pytest.mark.parametrize(
-    "names",
-    [
-        "Sollposition [mm];Istposition [mm]",
-        "Solllage [mm];Istlage [mm]",
-        "X_SollPos [mm];X_IstPos [mm]",
-        "Lagesollwert Achse X [mm];Lageistwert Achse X [mm]",
-    ],
-)
-def test_a_german_log(tmp_path: Path, names: str) -> None:
-    log = read_log(write_csv(tmp_path / "log.csv", f"Zeit [ms];{names}\n0;1,5;1\n2;2;1,5\n"))
+def test_a_german_log(tmp_path: Path) -> None:
+    log = read_log(write_csv(tmp_path / "log.csv", "Zeit [ms];Solllage [mm];Istlage [mm]\n0;1,5;1\n2;2;1,5\n"))
     np.testing.assert_allclose((*log.t, *log.x_d, *log.x_meas), (0, 2e-3, 1.5e-3, 2e-3, 1e-3, 1.5e-3))
 
 

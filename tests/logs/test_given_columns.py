@@ -204,52 +204,39 @@ def test_what_is_no_log(given: Any) -> None:
     refused("a log is a file, a mapping of columns or a table, got", given, T_s=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("names", "axis"),
-    [
-        (("target_q_{}", "actual_q_{}", "target_qd_{}", "actual_qd_{}"), "3"),
-        (("desired.positions[{}]", "actual.positions[{}]", "desired.velocities[{}]"), "3"),
-        (("/arm/state/reference/positions[{}]", "/arm/state/feedback/positions[{}]"), "3"),
-        (("q_cmd[{}]", "q_act[{}]"), "3"),
-        (("x_d[{}]", "x[{}]"), "3"),
-        (("ctrl_pos|{}", "enc_pos|{}", "des_pos|{}"), "3"),
-        (("set_point", "process_value"), None),
-        (("Axis_{}.Position", "Axis_{}.ActualPosition", "Axis_{}.Velocity", "Axis_{}.ActualVelocity"), "3"),
-        (("/joint_commands/a{}/position", "/joint_states/a{}/position"), "a3"),
-        (("RPOS({})", "FPOS({})", "PE({})"), "1"),
-        (("s noml X [mm]", "s actual X [mm]", "s diff X [mm]", "v noml X [mm/min]"), None),
-        (("PCMD(X)[mm]", "POSF(X)[mm]", "VCMD(X)[rpm]"), None),
-        (("PL.CMD (mm)", "PL.FB (mm)", "PL.ERR (mm)", "VL.CMD (rpm)"), None),
-        (("A: PCTRL_S_SET", "A: PCTRL_S_ACT", "A: PCTRL_LAG_ERROR"), None),
-        (("A Axis Reference Position", "A Axis Motor Position", "A Axis Position Error"), None),
-        (("Cumulative command pulses[pulse]", "Cumulative feedback pulses[pulse]", "Droop pulses[pulse]"), None),
-        (("Position Demand Value [qc]", "Position Actual Value [qc]", "Velocity Demand Value [rpm]"), None),
-        (("Position demand value (0x6062)", "Position actual value (0x6064)", "Target position (0x607A)"), None),
-        (("Position Command [cnt]", "Position [cnt]", "Position Error [cnt]"), None),
-        (
-            ("S-0-0047, Lage-Sollwert [mm]", "S-0-0051, Lage-Istwert Geber 1 [mm]", "S-0-0189, Schleppabstand [mm]"),
-            None,
-        ),
-        (("axis0.controller.input_pos", "axis0.pos_estimate", "axis0.vel_estimate"), None),
-        (("control_position", "position", "velocity"), None),
-        (("target", "angle", "voltage"), None),
-        (("theta_des", "theta"), None),
-        (("x_cmd_counts", "x_fb_counts"), None),
-        (("target_position", "current_position", "current"), None),
-        (("log.x_d.Data", "log.x.Data"), None),
-        (("Sollposition [unit]", "Istposition [unit]"), None),
-        (("Position command", "Position actual", "Position command velocity", "Position actual velocity"), None),
-        (("ref", "fb", "control"), None),
-    ],
+OF_TOOLS = (
+    "target_q_{} | actual_q_{} | target_qd_{} | actual_qd_{} @ 3; q_cmd[{}] | q_act[{}] @ 3; x_d[{}] | x[{}] @ 3; "
+    "desired.positions[{}] | actual.positions[{}] | desired.velocities[{}] @ 3; set_point | process_value; "
+    "/arm/state/reference/positions[{}] | /arm/state/feedback/positions[{}] @ 3; ctrl_pos|{} | enc_pos|{} | des_pos|{} @ 3; "
+    "Axis_{}.Position | Axis_{}.ActualPosition | Axis_{}.Velocity | Axis_{}.ActualVelocity @ 3; "
+    "/joint_commands/a{}/position | /joint_states/a{}/position @ a3; RPOS({}) | FPOS({}) | PE({}) @ 1; "
+    "s noml X [mm] | s actual X [mm] | s diff X [mm] | v noml X [mm/min]; PCMD(X)[mm] | POSF(X)[mm] | VCMD(X)[rpm]; "
+    "PL.CMD (mm) | PL.FB (mm) | PL.ERR (mm) | VL.CMD (rpm); A: PCTRL_S_SET | A: PCTRL_S_ACT | A: PCTRL_LAG_ERROR; "
+    "A Axis Reference Position | A Axis Motor Position | A Axis Position Error; "
+    "Cumulative command pulses[pulse] | Cumulative feedback pulses[pulse] | Droop pulses[pulse]; "
+    "Position Demand Value [qc] | Position Actual Value [qc] | Velocity Demand Value [rpm]; "
+    "Position demand value (0x6062) | Position actual value (0x6064) | Target position (0x607A); "
+    "Position Command [cnt] | Position [cnt] | Position Error [cnt]; "
+    "S-0-0047, Lage-Sollwert [mm] | S-0-0051, Lage-Istwert Geber 1 [mm] | S-0-0189, Schleppabstand [mm]; "
+    "axis0.controller.input_pos | axis0.pos_estimate | axis0.vel_estimate; control_position | position | velocity; "
+    "target | angle | voltage; theta_des | theta; J{}_cmd | J{}_fb @ J3; x_cmd_counts | x_fb_counts; "
+    "target_position | current_position | current; log.x_d.Data | log.x.Data; "
+    "Sollposition [unit] | Istposition [unit]; X_SollPos | X_IstPos; Lagesollwert Achse X | Lageistwert Achse X; "
+    "Position command | Position actual | Position command velocity | Position actual velocity; ref | fb | control"
 )
-def test_names_of_robots_and_controllers(names: tuple[str, ...], axis: str | None) -> None:
+"""Commanded and measured position, then others, as controllers, drives and recorders call them; and the axis."""
+
+
+@pytest.mark.parametrize("one", OF_TOOLS.split("; "))
+def test_names_of_robots_and_controllers(one: str) -> None:
     """The columns in any order; beside them errors, velocities and targets of whole moves."""
+    names, axis = one.partition(" @ ")[0].split(" | "), one.partition(" @ ")[2] or None
     data = {name.format(j): (j + 1) * x for j in range(4) for name, x in zip(names, [X_D, X, X, X], strict=False)}
-    n = 1e-3 * (int((axis or "3").strip("a")) + 1)
+    n = 1e-3 * (int((axis or "3").strip("aJ")) + 1)
     for order in (list(data), list(data)[::-1]):
         log = read_log({name: data[name] for name in order}, T_s=1e-3, axis=axis, unit="mm")
         np.testing.assert_allclose((log.x_d, log.x_meas), (n * X_D, n * X), rtol=1e-15)
-        assert log.columns == tuple(name.format((axis or "").strip("a")) for name in names[:2])
+        assert log.columns == tuple(name.format((axis or "").strip("aJ")) for name in names[:2])
 
 
 @pytest.mark.parametrize("name", ["Boom Ms", "Boom ms", "Room in", "q[0]", "x_m"])

@@ -81,7 +81,6 @@ def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
         ("a\nb;c\n# d\n1;2\n", r"columns 't', 'x_d', 'x' are missing, the file has 'b', 'c'"),
         ("# nothing\n# else\n", r"columns 't', 'x_d', 'x' are missing, the file has 'nothing'"),
         (TWO_ROWS, r"has no line of names, its first line is numbers \('0', '1', '2'\); put one above.* as t,x_d,x: "),
-        ("0,0,0\n1,0,0\n", r"its first line is numbers \('0', '0', '0'\);"),
         ("10:20:30,1,2\n10:20:31,3,4\n", "has no line of names, its first line is numbers"),
         ("t,x_d,x\n0,0,0\n1,nan,0\n", r"log\.csv, line 3: column 'x_d' must be finite, got nan$"),
         ("t,x_d,x\n0,0,0\n1,0,inf\n", "line 3: column 'x' must be finite, got inf$"),
