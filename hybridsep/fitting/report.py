@@ -16,11 +16,9 @@ from ..logs.checks import Finding
 from ..logs.log import Log
 from ..logs.units import stated_unit
 from .advice import OF_ITSELF, Judged, advice_on, extent, peers_in_words
-from .choice import WORTH, Tried
 
 _NAMES = ("physics model", "hold the last residual", "hybrid")  # names of what a replay predicts by
 _COLOURS = (PHYSICS, HOLD, HYBRID)  # their colours
-
 _COMMAND = "#1d2733"
 
 
@@ -149,22 +147,6 @@ def _correlations(test: ResidualTest, T_s: float) -> Chart:
         Line("with the commanded velocity before it", lag, test.with_command, HYBRID, panel=1),
     ]
     return Chart("lag [ms]", ("correlation",) * 2, lines, " ".join(words))
-
-
-def write_settings(report: Report, choice: Sequence[Tried], judged: Judged) -> None:
-    """Write the settings that were tried."""
-    scale, unit = judged.unit
-    report.heading("Settings")
-    rows = []
-    for one in choice:
-        rms = f"{scale * one.rms_h:.4g}" if math.isfinite(one.rms_h) else "diverged"
-        rows.append([str(one.p), str(one.q), rms, "chosen" if one.chosen else ""])
-    report.table(["p", "q", f"RMS [{unit}]", ""], rows)
-    report.paragraph(
-        "Errors of causal replays over the later half of the training samples. The first row, the default, stays "
-        f"unless another is better by {100 * WORTH:g} %.",
-        "dim",
-    )
 
 
 def _write_time(report: Report, judged: Judged) -> None:

@@ -67,8 +67,8 @@ def choose_columns(
     if time is not None or "t" in given or time_needed:
         chosen = {"t": time, **chosen}
     speeds = [name for role, name in chosen.items() if role != "t" and name and has_word("velocity", name)]
-    remarks = [*remarks, *(f"column {brief(name)} is called a velocity, and read as a position" for name in speeds)]
-    source.remarks = [*source.remarks, *remarks]
+    speeds = [f"column {brief(name)} is called a velocity, and read as a position" for name in speeds]
+    source.remarks = [*source.remarks, *remarks, *speeds]
     found: dict[str, Column] = {}
     names = {role: name for role, name in chosen.items() if name is not None}
     if len(names) < len(chosen):
@@ -215,9 +215,9 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     of_python += ", or T_s=SECONDS" if "t" in names else ""
     there = f"{which} missing, the file has {listed(source.names)}"
     errors, speeds = ([name for name in source.names if has_word(kind, name)] for kind in ("error", "velocity"))
-    instead = "" if set(names) == {"t"} else "; velocities are none: record positions" if speeds and not errors else ""
-    if errors and not instead and set(names) != {"t"}:
-        what = "an error alone tells no command" if len(names.keys() - {"t"}) > 1 else "or write it into the file"
+    instead = "; velocities are none: record positions" if speeds and not errors and set(names) != {"t"} else ""
+    if errors and set(names) != {"t"}:
+        what = "an error alone tells no command" if {"x_d", "x"} <= names.keys() else "or write it into the file"
         instead = f"; {what}: x = x_d − {brief(errors[0])}, plus where that is x − x_d"
     return LogError(f"{source.path}: {there}; name {it}: {options}{of_python}{instead}")
 

@@ -48,12 +48,6 @@ _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
     ("NI TDMS", (b"TDSm",), _PAGE),
     ("Arrow or Feather", (b"ARROW1", b"\xff\xff\xff\xff", b"FEA1"), _PANDAS.format("feather")),
     ("a NumPy .npy array", (b"\x93NUMPY",), "numpy.savez('log.npz', t=a[:, 0], x_d=a[:, 1], x=a[:, 2])"),
-    (
-        "halscope's file of LinuxCNC before 2.9",
-        (b"Sampling period is",),
-        "import numpy; a = numpy.loadtxt('{path}', str, skiprows=2)[:-1]; "
-        "numpy.savez('log.npz', **dict(zip(a[0, ::2], a[:, 1::2].T.astype(float)))); the first line has T_s",
-    ),
     ("a ROS bag", (b"#ROSBAG", b"\x89MCAP0"), "export the joint's topic as CSV, for example by PlotJuggler"),
     ("an old Excel workbook", (b"\xd0\xcf\x11\xe0",), f"{_SAVE} there"),
     (

@@ -114,31 +114,24 @@ def read_log(
 ) -> Log:
     """Read a log as it was recorded: in the order of the file, every sample. Its units are said here, and nowhere else.
 
-    Measured positions that are missing are NaN. Up to 10 rows that are lost in a row are put back, where the times tell
-    how many they are: the command as the cubic through its neighbours, the measurement missing. Longer gaps, and times
-    that go back, begin another segment. What keeps the file's meaning is done, and said in :attr:`Log.remarks`: the
-    wraps of a counter and the whole turns of a rotary axis are unwrapped, rows that repeat the one before, time
-    included, are left out, and of a sensor that is renewed every n samples the samples are taken in which it is new.
+    Measured positions that are missing are NaN; longer gaps, and times that go back, begin another segment. What keeps
+    the file's meaning is done, and said in :attr:`Log.remarks`: the page on formats of logs tells what.
 
     Parameters
     ----------
     recording : str, Path, mapping or table
         A file in a format of :mod:`hybridsep.logs.formats`; what it is, its content tells. Or columns in memory:
-        ``{"x_d": x_d, "x": x}``, a structured array, or a table of pandas, polars, Arrow or xarray. What is masked,
-        None or NA is missing; an index of times is the time, and one of numbers tells which rows were left out; a
-        quantity has its unit.
+        ``{"x_d": x_d, "x": x}``, a structured array, or a table of pandas, polars, Arrow or xarray, with its index of
+        times or numbers. What is masked, None or NA is missing; a quantity has its unit.
     columns : mapping, optional
         The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
         ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read
-        where the file has it. In text a time may be a clock timestamp, ``2026-03-05 10:20:30.001`` or a time of day,
-        with its date in a column beside it or without; the only such column is ``"t"`` whatever its name.
+        where the file has it.
     unit : str, optional
         Unit of the positions: m, mm, um, nm, in, or rad, mrad, urad, deg, rev for a rotary axis, or a multiple of
-        one, ``0.1um``, such as an encoder's count. If left out, the unit in the columns' names (``x [mm]``), otherwise
-        m.
+        one, ``0.1um``, such as an encoder's count. If left out, that in the columns' names (``x [mm]``), or m.
     T_s : float, optional
-        Sampling interval, s; needed if the file has no time column, or one that counts samples, is rounded too
-        coarsely or in an unknown unit; otherwise it is checked against the times.
+        Sampling interval, s; needed if no column of times tells it, otherwise it is checked against the times.
     axis : str, optional
         Axis of a file that holds several, such as ``"X1"``; of a matrix the column, ``"0"``.
     delay : int
@@ -169,8 +162,7 @@ def read_log(
     chosen = {**chosen, **signal_columns(source, chosen)}
     block, resampling = side_by_side(source, chosen, resample=resample)
     read, repeats = _without_repeats(_checked(path, block, chosen))
-    if "t" in read:
-        _check_alternation(path, read["t"], read["x_d"])
+    _check_alternation(path, read.get("t", np.arange(2.0)), read["x_d"])
     own = {what: chosen[what].unit.factor * read[what] for what in SIGNALS if what in chosen}
     signals = {what: values for what, values in own.items() if not np.isnan(values).all()}
     x_d, x_meas = (chosen[role].unit.factor * read[role] for role in ("x_d", "x"))
@@ -248,9 +240,9 @@ def _without_repeats(read: dict[str, Array]) -> tuple[dict[str, Array], str]:
 
 
 def _check_alternation(path: Path, t: Array, x_d: Array) -> None:
-    """Raise LogError if rows of several axes follow each other: times repeat, and commands are as some rows before."""
+    """Raise LogError if rows of k axes follow each other: times repeat, and commands move far less over k rows."""
     k = round(len(t) / (np.count_nonzero(np.diff(t)) + 1))
-    if 1 < k < len(t) and np.abs(x_d[k:] - x_d[:-k]).sum() < _ALTERNATES * np.abs(np.diff(x_d)).sum():
+    if 1 < k < len(t) and np.abs(x_d[k:] - x_d[:-k]).sum() < 0.2 * np.abs(np.diff(x_d)).sum():
         raise LogError(f"{path}: rows of {k} axes follow each other; write those of one into a file of their own")
 
 
@@ -300,8 +292,6 @@ _TURN = 2 * math.pi
 
 _JUMP = 3.0  # largest difference of a jump from a whole turn, in the largest steps that are no jumps
 _WITHIN = 1.05  # largest range, in turns, of a position modulo one turn with its noise
-
-_ALTERNATES = 0.2  # way of a command over as many rows as there are axes, relative to that from row to row
 
 _ONE_PHASE, _CHANGES = 0.95, 50
 """Share of a slow sensor's changes that come in one sample of every n, which no other log of a hundred reached for any

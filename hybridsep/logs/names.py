@@ -34,11 +34,10 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 
 _SOLL, _IST = {"sollposition", "solllage", "lagesollwert"}, {"istposition", "istlage", "lageistwert"}
 _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "sp", "des", "desired", "target"}
-_COMMANDED |= {"commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"}
+_COMMANDED |= {"commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"} | _SOLL
 _MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "pv", "ist"} | _IST
 _MEASURED |= {"estimate", "estimated", "mesure", "istwert"}
 _POSITION = {"pos", "position", "positions", "lage", "angle", "pl", "pctrl", "pulses"} | _SOLL | _IST
-_COMMANDED |= _SOLL
 _FILLING = {"axis", "value", "values", "data", "state", "states", "current"}
 _SENT = {"control", "input"}  # commanded beside a word for the position, else a controller's output
 _VELOCITY = {"vel", "velo", "velocity", "velocities", "speed", "speeds", "geschwindigkeit"}
@@ -56,8 +55,7 @@ _POS = re.compile(r"(?<=[a-z\d])(pos)(?![a-z])", re.IGNORECASE)
 _AXIS = re.compile(r"([xyzabcqj]|joint|theta|phi|psi)?_?\d*", re.IGNORECASE)
 _ACTUAL = re.compile(r"(?<=\.)Actual(?=Position)")
 _COLUMN = re.compile(r"\[(\d+)\]$")
-"""Names of axes that need no word for the position beside them: x_cmd is one, v_cmd a velocity; ``q[0]`` is a matrix's
-first column."""
+"""Names of axes that need no word for the position: x_cmd is one, v_cmd a velocity; ``q[0]`` is a matrix's column."""
 
 
 def known_names(role: str, names: Sequence[str]) -> list[str]:

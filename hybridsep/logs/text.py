@@ -428,11 +428,7 @@ def _with_names(
     has_units = len(above) > 1 and _is_row_of_units([above[0][1][i] for i in numeric])
     nearest = above[has_units:][:2]  # the one with more known names counts
     header, names = max(nearest, key=lambda row: n_known(row[1]) if len(row[1]) == len(nearest[0][1]) else -1)
-    units = (
-        dict(zip(names, above[0][1], strict=False))
-        if has_units
-        else dict(zip(names[1:], (keyed or [])[1:], strict=False))
-    )
+    units = dict(zip(names, above[0][1] if has_units else ["", *(keyed or [""])[1:]], strict=False))
     comma, settled = _comma_of([[row[i] for row in fields] for i in range(width)])
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}

@@ -223,7 +223,6 @@ DAMAGED = {
     "halscope": [
         ("period is 1000000", "period is 0", "line 1: the sampling period must be a positive number of ns"),
         ("x_d;x\n", "x_d;x;y\n", r"line 5: 3 columns were expected as in line 2, got 2"),
-        ("# ", "", r"is halscope's file of LinuxCNC before 2\.9, which is not read; import numpy"),
     ],
 }
 

@@ -207,7 +207,8 @@ def test_what_is_no_log(given: Any) -> None:
 OF_TOOLS = (
     "target_q_{} | actual_q_{} | target_qd_{} | actual_qd_{} @ 3; q_cmd[{}] | q_act[{}] @ 3; x_d[{}] | x[{}] @ 3; "
     "desired.positions[{}] | actual.positions[{}] | desired.velocities[{}] @ 3; set_point | process_value; "
-    "/arm/state/reference/positions[{}] | /arm/state/feedback/positions[{}] @ 3; ctrl_pos|{} | enc_pos|{} | des_pos|{} @ 3; "
+    "/arm/state/reference/positions[{}] | /arm/state/feedback/positions[{}] @ 3; ref | fb | control; "
+    "ctrl_pos|{} | enc_pos|{} | des_pos|{} @ 3; "
     "Axis_{}.Position | Axis_{}.ActualPosition | Axis_{}.Velocity | Axis_{}.ActualVelocity @ 3; "
     "/joint_commands/a{}/position | /joint_states/a{}/position @ a3; RPOS({}) | FPOS({}) | PE({}) @ 1; "
     "s noml X [mm] | s actual X [mm] | s diff X [mm] | v noml X [mm/min]; PCMD(X)[mm] | POSF(X)[mm] | VCMD(X)[rpm]; "
@@ -222,14 +223,13 @@ OF_TOOLS = (
     "target | angle | voltage; theta_des | theta; J{}_cmd | J{}_fb @ J3; x_cmd_counts | x_fb_counts; "
     "target_position | current_position | current; log.x_d.Data | log.x.Data; "
     "Sollposition [unit] | Istposition [unit]; X_SollPos | X_IstPos; Lagesollwert Achse X | Lageistwert Achse X; "
-    "Position command | Position actual | Position command velocity | Position actual velocity; ref | fb | control"
+    "Position command | Position actual | Position command velocity | Position actual velocity"
 )
 """Commanded and measured position, then others, as controllers, drives and recorders call them; and the axis."""
 
 
 @pytest.mark.parametrize("one", OF_TOOLS.split("; "))
 def test_names_of_robots_and_controllers(one: str) -> None:
-    """The columns in any order; beside them errors, velocities and targets of whole moves."""
     names, axis = one.partition(" @ ")[0].split(" | "), one.partition(" @ ")[2] or None
     data = {name.format(j): (j + 1) * x for j in range(4) for name, x in zip(names, [X_D, X, X, X], strict=False)}
     n = 1e-3 * (int((axis or "3").strip("aJ")) + 1)
@@ -239,15 +239,11 @@ def test_names_of_robots_and_controllers(one: str) -> None:
         assert log.columns == tuple(name.format((axis or "").strip("aJ")) for name in names[:2])
 
 
-@pytest.mark.parametrize("name", ["Boom Ms", "Boom ms", "Room in", "q[0]", "x_m"])
-def test_names_that_state_no_unit(name: str) -> None:
-    assert stated_unit(name) == (name, "")
-
-
-def test_units_after_a_comma() -> None:
+def test_units_of_names() -> None:
     assert stated_unit("Position, mm") == ("Position", "mm")
-    assert stated_unit("t_milliseconds") == ("t", "milliseconds")
-    assert stated_unit("t [milliseconds]") == ("t", "milliseconds")
+    assert stated_unit("t_milliseconds") == stated_unit("t [milliseconds]") == ("t", "milliseconds")
+    for name in ("Boom Ms", "Boom ms", "Room in", "q[0]", "q(1)", "x_m"):
+        assert stated_unit(name) == (name, "")
 
 
 @pytest.mark.parametrize(
