@@ -54,7 +54,7 @@ FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to s
 _GAIN = 0.05  # relative gain from which on a limit twice as large, or a longer look-ahead, is advised
 
 _TRIED_MAX = 10_000  # leading samples on which a compensator is tried
-_AHEAD = (0.025, 0.05, 0.1, 0.2, 0.4)  # look-aheads, s, that are tried beside the machine's own and the model's
+_AHEAD = (0.025, 0.05, 0.1, 0.2, 0.4)  # look-aheads, s, that are tried, doubled until a quarter of the model's is there
 _DEMANDING = 2000  # most samples of the stretch on which limits and look-aheads are tried
 _LIGHTER = 1e-3  # ``jerk_weight`` relative to the machine's with which plans that it binds leave less
 _LITTLE = 0.01  # share of the error without compensation below which errors are alike
@@ -459,7 +459,8 @@ class Stretch:
         machine = self.trial.machine
         known, own = machine.compensator_predictor, machine.compensator_settings
         least, needed, tried = PARAMETERS["preview"].minimum, machine.look_ahead, []
-        chosen, sizes = own.preview or needed, (round(one / known.T_s) for one in _AHEAD)
+        unit = 2.0 ** math.ceil(max(0.0, math.log2(0.25 * needed * known.T_s / _AHEAD[-1]))) / known.T_s
+        chosen, sizes = own.preview or needed, (round(unit * one) for one in _AHEAD)
         for preview in sorted({*(one for one in sizes if least <= one <= len(self.x_d)), chosen, needed}):
             settings, Np = own, known.Np
             if preview != own.preview:

@@ -364,9 +364,8 @@ def _hint(field: str, comma: str | None) -> str:
 def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
     """Return the table of a file that begins with these lines, numbered from 1; None if they are all comments.
 
-    Of the delimiters that which gives most rows of numbers in a row counts, then that with most columns. Where there
-    is none, the first line that is no comment is taken for the names, so that the reader's message names what is wrong
-    below it.
+    Of the delimiters that with most rows of numbers in a row counts, then with most columns. Without any the first line
+    that is no comment is taken for the names, so that the reader's message names what is wrong below it.
     """
     tables: list[tuple[tuple[int, int], _Table]] = []
     for delimiter in _DELIMITERS:

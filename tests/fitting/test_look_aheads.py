@@ -128,6 +128,12 @@ def test_plans_go_on_where_the_limits_are_slow_to_take_the_error_back() -> None:
     assert rms(left) < 0.05 * stretch.off  # 0.7 in plans that end with the preview
 
 
+def test_slow_axes_are_tried_with_longer_ones() -> None:
+    crane, T_s = ModalModel([Mode(0.25, 0.3, (0.5 * np.pi) ** 2)]), 10 * T_S
+    found = looked(replace(axis(crane, 50), T_s=T_s), Recording(np.repeat(MOVES, 2), np.zeros(2 * len(MOVES)), 500))
+    assert [one.preview for one in found.tried][-6:] == [20, 40, 50, 80, 160, crane.look_ahead(T_s)]
+
+
 def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
     """At 250 Hz, where the shortest plans have windows of three samples; the quick move comes after a slow one."""
     T_s = 4 * T_S

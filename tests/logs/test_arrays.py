@@ -94,7 +94,6 @@ def test_version_4_of_matlab(tmp_path: Path) -> None:
 
 
 def test_structs(tmp_path: Path) -> None:
-    """One of columns; two; Simulink's with time; timeseries."""
     data, path = columns(), tmp_path / "log.mat"
     signals = np.array([(data["x_d"], "x_d"), (data["x"], "x")], [("values", "O"), ("label", "O")])
     series = {role: {"Time": data["t"], "Data": data[role]} for role in ("x_d", "x")}

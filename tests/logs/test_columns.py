@@ -22,7 +22,6 @@ from hybridsep.logs.log import read_log
         (("x",), {}, "x"),
         (("x_meas",), {}, "x_meas"),
         (("x", "x_meas"), {}, "x_meas"),
-        (("x_meas", "x"), {}, "x_meas"),
         (("x", "x_meas"), {"x": "x"}, "x"),
         (("x_meas", "x_enc"), {"x": "x_enc"}, "x_enc"),
     ],
@@ -141,7 +140,6 @@ def test_a_given_unit_must_not_contradict_the_names(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "t,x_d [mm],x [mm]\n0,1,2\n1,3,4\n")
     refused(r"unit='um' \(--unit um\) was given, but column 'x_d \[mm\]' states 'mm'", path, unit="um")
     assert read_log(path, unit="mm").x_d[1] == read_log(path, unit="millimetre").x_d[1] == 3e-3
-    assert read_log(path, columns={"x": "x"}).x_meas[1] == 4e-3
     refused(r"axis 'X1' is missing; no names tell axes: name the columns, --x_d and --x", path, axis="X1")
 
 
