@@ -90,13 +90,15 @@ class PlanModel:
         self._state, self._late, self._start, self._path = state, late, start, np.concatenate((late, path))
         self._load = load
         window = self._window(x_d)
-        self.scales = model.scales_of(window)
+        self.scales, of_physics = model.scales_of(window)
         self._solved = model.solved(self.scales)
         counts = np.arange(len(late) + len(x_d))
         behind = counts[len(late) + model.settings.Np :]
         behind -= np.arange(len(behind)) % _APART
         # Prediction under ``x_d``, whose variances all others have.
-        self.of_previous_plan = model.forecast_by(self._solved, window, self.scales, counts=counts)
+        self.of_previous_plan = model.forecast_by(
+            *(self._solved, window, self.scales), counts=counts, of_physics=of_physics
+        )
 
     def _window(self, x_d: Array) -> ResidualWindow:
         """Return the plan under commands ``x_d``, and what is late before it."""

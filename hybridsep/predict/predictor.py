@@ -231,7 +231,8 @@ class HybridPredictor:
             if before is not None:
                 window = ResidualWindow(x_d + before.x_d, x_pb + before.x_pb, start, path)
                 physics, e_pb = physics + before.state, e_pb - before.x_pb[:m]
-                forecast, residual = replace(forecast, window=window), residual.begin_in_motion(window, forecast.scales)
+                forecast = replace(forecast, window=window, of_physics=None)
+                residual = residual.begin_in_motion(window, forecast.scales)
         residual, accepted = residual.learn(forecast, measured - start, fold=learn, ahead=ahead)
         uncertainty = state.uncertainty.learn(error, e_pb, accepted, self.Np) if learn else state.uncertainty
         x_d, on_the_way = forecast.window.x_d, forecast.window.x_d[m : m + late].copy()

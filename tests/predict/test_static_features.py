@@ -67,7 +67,7 @@ def test_each_column_in_windows_of_any_length(hold: str, dead_time: int, q: int,
         window = slice(first, first + n)
         before = numbers_of(state)
         of_residual = ResidualWindow(x_d[window], x_pb[window], ORIGIN, x_d[window])
-        more, after = static.rows(state, of_residual, x[window], SCALE)
+        more, after, *_ = static.rows(state, of_residual, x[window], SCALE)
         np.testing.assert_array_equal(numbers_of(state), before)  # the state is not changed
         rows.append(more)
         state, first = after, first + n
@@ -103,6 +103,6 @@ def test_peak_velocity_is_of_what_the_numbers_resolve() -> None:
 def test_at_rest_only_the_constant_is_left() -> None:
     static = features("foh", 2, 3)
     still = np.zeros(50)
-    rows, _ = static.rows(static.rest(), ResidualWindow(still, still, ORIGIN, still), still, 0.0)
+    rows, *_ = static.rows(static.rest(), ResidualWindow(still, still, ORIGIN, still), still, 0.0)
     np.testing.assert_array_equal(rows[:, 0], 1.0)
     np.testing.assert_array_equal(rows[:, 1:], 0.0)

@@ -156,7 +156,7 @@ class SolvedExpert(NamedTuple):
                 leverage = self.solution.leverage(features[places])[back]
             variance = self.variance * leverage
             if p:
-                variance = np.asarray(lfilter(response**2, [1.0], variance))
+                variance = np.convolve(response**2, variance)[: len(variance)]
             most = _DIVERGED * bound**2
             variance = np.where(finite, np.minimum(variance, most), most)
             shrinkage = largest_square / (largest_square + variance)

@@ -16,7 +16,7 @@ are a constant and the increments ``x_d(k−d−j) − x_d(k−d−j−1)``, ``j
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -109,6 +109,16 @@ class StaticState:
     x_d: Array  # (d + p_A + 1,), m: last commands, oldest first, of which the command's expert has ``p_A`` lags
     x_pb: Array  # (4,), m: last physics-based predictions, oldest first
     stops: Array  # (N_STOPS,), m: of the stop operators
+
+
+class StaticRows(NamedTuple):
+    """Features of a window."""
+
+    rows: Array  # (n, n_static)
+    after: StaticState  # the state behind it
+    # (n, n_disturbances) and (n, N_STOPS), m: before they are filtered, and the stop operators
+    disturbances: Array
+    stops: Array
 
 
 @dataclass(frozen=True)
@@ -233,24 +243,38 @@ class StaticFeatures:
         return found
 
     def rows(
-        self, state: StaticState, window: ResidualWindow, x: Array, velocity_scale: float
-    ) -> tuple[Array, StaticState]:
+        self,
+        state: StaticState,
+        window: ResidualWindow,
+        x: Array,
+        velocity_scale: float,
+        like: StaticRows | None = None,
+    ) -> StaticRows:
         """Return the features of a window, ``(n, self.n)``, and the state after it.
 
         Columns: 1; ``x_pb`` and its differences; changes of the command; the filtered disturbances; their first
         differences.
 
         ``x``, (n,), m: position that the stiffness acts at, and whose velocity is damped with ``n_known``;
-        ``velocity_scale``: velocity, m/s, that the friction's change of sign is relative to; 0 before any motion.
+        ``velocity_scale``: velocity, m/s, that the friction's change of sign is relative to; 0 before any motion;
+        ``like``: features of the same window, or of a longer one, for another ``x``.
         SignalError if a disturbance of the user's own does not return a finite number for each sample.
         """
         x_d, x_pb, start, _ = window
-        first, v_d, v = self.n_linear, self.velocity(state, x_d), self.damped_velocity(state, x_pb, x)
+        first, stiffness, n = self.n_linear, N_FRICTION + N_STOPS, len(x_d)
+        v_d, v = self.velocity(state, x_d), self.damped_velocity(state, x_pb, x)
         past, commands = np.concatenate((state.x_pb, x_pb)), np.concatenate((state.x_d, x_d))
-        disturbances = np.empty((len(x_d), self.n_disturbances))
-        disturbances[:, :N_FRICTION] = np.tanh(v_d[:, None] / self.spread(velocity_scale))
-        stops, stiffness = self.stops(state, x_d, velocity_scale), N_FRICTION + N_STOPS
-        disturbances[:, N_FRICTION:stiffness] = stops / self.distances(velocity_scale)
+        if like is None:
+            disturbances, rows = np.empty((n, self.n_disturbances)), np.empty((n, self.n))
+            disturbances[:, :N_FRICTION] = np.tanh(v_d[:, None] / self.spread(velocity_scale))
+            stops = self.stops(state, x_d, velocity_scale)
+            disturbances[:, N_FRICTION:stiffness] = stops / self.distances(velocity_scale)
+            rows[:, 0] = 1.0
+            for i in range(self.n_differences + 1):
+                rows[:, 1 + i] = np.diff(past, i)[_DIFFERENCES + 1 - i :]
+            rows[:, first - N_SPANS : first] = np.transpose(self.command.changes(commands, n))
+        else:
+            rows, disturbances, stops = like.rows[:n].copy(), like.disturbances[:n].copy(), like.stops[:n]
         disturbances[:, stiffness] = x * np.abs(x)
         disturbances[:, stiffness + 1] = v * np.abs(v)
         if self.period > 0.0:
@@ -261,12 +285,8 @@ class StaticFeatures:
             at_rest = self.own_at(np.full(1, start), np.zeros(1))
             disturbances[:, -len(self.own) :] = self.own_at(start + x, v_d) - at_rest
         filtered, filters = self.discrete.forced_response(state.filters, disturbances)
-        rows = np.empty((len(x_d), self.n))
-        rows[:, 0] = 1.0
-        for i in range(self.n_differences + 1):
-            rows[:, 1 + i] = np.diff(past, i)[_DIFFERENCES + 1 - i :]
-        rows[:, first - N_SPANS : first] = np.transpose(self.command.changes(commands, len(x_d)))
         rows[:, first : first + self.n_disturbances] = filtered
         rows[:, first + self.n_disturbances :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
         before = past[-_DIFFERENCES - 1 :].copy()
-        return rows, StaticState(filters, filtered[-1].copy(), commands[len(x_d) :], before, stops[-1].copy())
+        after = StaticState(filters, filtered[-1].copy(), commands[n:], before, stops[-1].copy())
+        return StaticRows(rows, after, disturbances, stops)

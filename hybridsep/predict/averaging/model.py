@@ -41,7 +41,7 @@ from .experts import (
     ResidualScale,
     SolvedExpert,
 )
-from .features import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticState
+from .features import LEAST_VELOCITY, Disturbance, StaticFeatures, StaticRows, StaticState
 from .gate import InnovationGate, gated
 from .recall import Memory
 from .stacking import Stack
@@ -114,6 +114,7 @@ class AveragedForecast(Forecast):
     """Window predicted by the averaged model."""
 
     scales: FeatureScales
+    of_physics: StaticRows | None  # static features for ``x_pb``
     x: Array  # (n,), m: position that the stiffness acts at
     stacked: Array  # (n_experts, n), m: predictions that are stacked
     predictions: Mapping[Regression, ExpertPrediction]  # of the regressions that know something
@@ -229,8 +230,8 @@ class AveragedModel:
         )
         return replace(self, learned=learned, evidence=(of_physics, of_command))
 
-    def scales_of(self, window: ResidualWindow) -> FeatureScales:
-        """Return the scales of the features, with the next window's.
+    def scales_of(self, window: ResidualWindow) -> tuple[FeatureScales, StaticRows]:
+        """Return the scales of the features, with the next window's, and its features for ``x_pb``.
 
         A compensator begins to move before its path, with a creep.
         """
@@ -244,10 +245,10 @@ class AveragedModel:
             peak = max(static.peak_velocity(window.raw_commands[settings.n_late :], window.start), before)
             outgrown = peak > max(before, LEAST_VELOCITY)
         velocity = peak if outgrown else before
-        rows, _ = static.rows(self.run.static, window, window.x_pb, velocity)
+        static_rows = static.rows(self.run.static, window, window.x_pb, velocity)
         largest = np.zeros(static.n) if outgrown else learned.largest
-        largest = np.maximum(largest, np.abs(rows).max(axis=0)) if velocity > 0.0 else np.ones(static.n)
-        return FeatureScales(velocity, largest, step)
+        largest = np.maximum(largest, np.abs(static_rows.rows).max(axis=0)) if velocity > 0.0 else np.ones(static.n)
+        return FeatureScales(velocity, largest, step), static_rows
 
     def solved(self, scales: FeatureScales) -> dict[Regression, SolvedExpert]:
         """Return the regressions that know something, with their weights."""
@@ -261,22 +262,23 @@ class AveragedModel:
         scales: FeatureScales,
         like: AveragedForecast | None = None,
         counts: NDArray[np.intp] | None = None,
+        of_physics: StaticRows | None = None,
     ) -> AveragedForecast:
         """Predict as :meth:`forecast` by the regressions of :meth:`solved`.
 
         ``like``: under other commands, with the same path: its shrinking is held; ``counts``, (n,): as
-        :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it.
+        :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it; ``of_physics``: features of the window
+        for ``x_pb``, if they are known.
         """
         x, path, held = window.x_pb, window.raw_commands, like.predictions if like else {}
         memory = like.memory if like else self.run.memory.append_commands(path, self.static.n_known, self.settings.Np)
         recalled = memory.recalled(len(path), modified=self.static.n_known is not None)
-        rows, _ = self.static.rows(self.run.static, window, x, scales.velocity)
-        at = ExpertWindow(self, window, solved, scales, rows, {}, recalled)
+        of_physics = of_physics or self.static.rows(self.run.static, window, x, scales.velocity)
+        at = ExpertWindow(self, window, solved, scales, of_physics.rows, {}, recalled)
         if STATIC in solved:
             # The stiffness acts at the position, which the physics model alone does not give well enough.
             x = x + STATIC.predict(at, held.get(STATIC), None).e_h
-            rows, _ = self.static.rows(self.run.static, window, x, scales.velocity)
-            at = replace(at, rows=rows)
+            at = replace(at, rows=self.static.rows(self.run.static, window, x, scales.velocity, of_physics).rows)
         predictions = {one: one.predict(at, held.get(one), counts) for one in solved}
         at, stacked = replace(at, predictions=predictions), np.empty((len(EXPERTS), len(x)))
         for one in EXPERTS:
@@ -291,15 +293,17 @@ class AveragedModel:
         for one, prediction in predictions.items():
             second[one.place] += prediction.variance
         variance = np.maximum(weights @ second - e_h**2, 0.0)
-        return AveragedForecast(window, e_h, variance, scales, x, stacked, predictions, shares, memory)
+        return AveragedForecast(window, e_h, variance, scales, of_physics, x, stacked, predictions, shares, memory)
 
     def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> AveragedForecast:
         """Predict the residual over the next window.
 
         ``scales``: by :meth:`scales_of` from its commands if left out; a compensator takes its preview's.
         """
-        scales = self.scales_of(window) if scales is None else scales
-        return self.forecast_by(self.solved(scales), window, scales)
+        of_physics = None
+        if scales is None:
+            scales, of_physics = self.scales_of(window)
+        return self.forecast_by(self.solved(scales), window, scales, of_physics=of_physics)
 
     def begin_in_motion(self, window: ResidualWindow, scales: FeatureScales) -> AveragedModel:
         """Correct what was before a run in motion: commands and physics-based prediction went on as they begin.
@@ -334,7 +338,8 @@ class AveragedModel:
         accepted, gate = gated(run.gate, measured, largest, learned.fastest, T_s)
         e = _bridged(forecast.e_h[:m], measured, accepted)
         e_0 = e + window.x_pb - self.static.command.late(run.static.x_d, window.x_d)
-        rows, static = self.static.rows(run.static, window, window.x_pb + e, learned.velocity_scale)
+        x, velocity = window.x_pb + e, learned.velocity_scale
+        rows, static, *_ = self.static.rows(run.static, window, x, velocity, forecast.of_physics)
         if fold:
             if run.level is None and accepted.any():
                 level = float(np.mean(e[accepted]))

@@ -59,11 +59,14 @@ class Memory:
         gamma, moved, begin = math.exp(-stride / len(path)), self.moved, len(self.commands)
         end = begin + len(new)
         begin = end - Np * (len(new) // Np)  # windows end with the commands; before the first one there is rest
-        changes = commands[stride:] - commands[:-stride]
+        changes, difference = commands[stride:] - commands[:-stride], np.empty(n)
         for first in range(begin, end, Np):
             for k in range(first - stride, first - stride + Np // stride * stride, stride):
                 distances *= gamma
-                distances += (changes[k] - changes[k - n : k]) ** 2 + _ALIKE
+                np.subtract(changes[k], changes[k - n : k], out=difference)
+                difference *= difference
+                difference += _ALIKE
+                distances += difference
                 moved = gamma * moved + (float(changes[k]) ** 2 + _ALIKE)
         n_ahead = max(self.n_ahead, len(path[:n_known]))
         return replace(self, commands=commands[len(new) :], distances=distances, moved=moved, n_ahead=n_ahead)
