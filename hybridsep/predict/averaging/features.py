@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.errors import SignalError
-from ...base.signals import Array
+from ...base.signals import Array, first_differences
 from ...model.discrete import DiscreteModel
 from ..regression import lags
 from ..window import ResidualWindow
@@ -190,7 +190,7 @@ class StaticFeatures:
 
     def stops(self, state: StaticState, x_d: Array, velocity_scale: float) -> Array:
         """Return the stop operators over a window, ``(n, N_STOPS)``, m."""
-        steps, found = np.diff(x_d, prepend=state.x_d[-1]).tolist(), np.empty((len(x_d), N_STOPS))
+        steps, found = first_differences(x_d, state.x_d[-1]).tolist(), np.empty((len(x_d), N_STOPS))
         for i, distance in enumerate(self.distances(velocity_scale).tolist()):
             u, of_operator = float(state.stops[i]), []
             for step in steps:
@@ -205,14 +205,14 @@ class StaticFeatures:
 
     def velocity(self, state: StaticState, x_d: Array) -> Array:
         """Return the commanded velocity over a window, ``(n,)``, m/s."""
-        return np.asarray(np.diff(x_d, prepend=state.x_d[-1]) / self.discrete.T_s)
+        return first_differences(x_d, state.x_d[-1]) / self.discrete.T_s
 
     def damped_velocity(self, state: StaticState, x_pb: Array, x: Array) -> Array:
         """Return the velocity of the damping over a window, ``(n,)``, m/s."""
-        v = np.diff(x_pb, prepend=state.x_pb[-1])
+        v = first_differences(x_pb, state.x_pb[-1])
         if self.n_known:
             e = x - x_pb
-            v = v + np.diff(e, prepend=e[:1])
+            v = v + first_differences(e, e[0])
         return np.asarray(v / self.discrete.T_s)
 
     def turned(self, state: StaticState, rows: Array) -> Array:
@@ -270,8 +270,10 @@ class StaticFeatures:
             stops = self.stops(state, x_d, velocity_scale)
             disturbances[:, N_FRICTION:stiffness] = stops / self.distances(velocity_scale)
             rows[:, 0] = 1.0
-            for i in range(self.n_differences + 1):
-                rows[:, 1 + i] = np.diff(past, i)[_DIFFERENCES + 1 - i :]
+            rows[:, 1], change = x_pb, past
+            for i in range(2, self.n_differences + 2):
+                change = change[1:] - change[:-1]
+                rows[:, i] = change[-n:]
             rows[:, first - N_SPANS : first] = np.transpose(self.command.changes(commands, n))
         else:
             rows, disturbances, stops = like.rows[:n].copy(), like.disturbances[:n].copy(), like.stops[:n]
@@ -286,7 +288,7 @@ class StaticFeatures:
             disturbances[:, -len(self.own) :] = self.own_at(start + x, v_d) - at_rest
         filtered, filters = self.discrete.forced_response(state.filters, disturbances)
         rows[:, first : first + self.n_disturbances] = filtered
-        rows[:, first + self.n_disturbances :] = np.diff(filtered, axis=0, prepend=state.filtered[None])
+        rows[:, first + self.n_disturbances :] = first_differences(filtered, state.filtered)
         before = past[-_DIFFERENCES - 1 :].copy()
         after = StaticState(filters, filtered[-1].copy(), commands[n:], before, stops[-1].copy())
         return StaticRows(rows, after, disturbances, stops)

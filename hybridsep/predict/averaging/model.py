@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.settings import PredictorSettings
-from ...base.signals import Array
+from ...base.signals import Array, first_differences
 from ...base.state import FIXED
 from ...model.discrete import DiscreteModel
 from ..regression import RidgeRegression, lags
@@ -331,7 +331,7 @@ class AveragedModel:
         """
         m, run = len(x), self.run
         window = forecast.window._replace(x_d=forecast.window.x_d[:m], x_pb=forecast.window.x_pb[:m])
-        fastest = float(np.abs(np.diff(window.x_pb, prepend=run.static.x_pb[-1])).max())
+        fastest = float(np.abs(first_differences(window.x_pb, run.static.x_pb[-1])).max())
         state = _with_scales(self, forecast, max(self.learned.fastest, fastest))
         learned, measured = state.learned, x - window.x_pb
         largest, T_s = learned.scales[MODEL_RESIDUAL].largest, self.settings.T_s
