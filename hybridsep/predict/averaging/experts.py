@@ -187,7 +187,9 @@ def _recursion(w_e: Array, drive: Array, past: Array) -> tuple[Array, Array]:
     with np.errstate(all="ignore"):  # an unstable recursion is recognised by what it gives
         e, _ = lfilter([1.0], denominator, drive, zi=state)
         response = lfilter([1.0], denominator, impulse)
-    return e, np.clip(np.nan_to_num(response, nan=_DIVERGED), -_DIVERGED, _DIVERGED)
+    if not np.abs(response).max() <= _DIVERGED:  # NaN too
+        response = np.clip(np.nan_to_num(response, nan=_DIVERGED), -_DIVERGED, _DIVERGED)
+    return e, response
 
 
 _LEAST = 1e-150  # magnitude of a feature that counts as 0

@@ -37,8 +37,10 @@ def gated(
     """
     known = largest > 0.0 and fastest > 0.0
     believed, n_missing, n_beyond, farthest = np.isfinite(e), gate.n_missing, gate.n_beyond, gate.farthest
-    patience = math.ceil(CONSTANTS.patience / T_s)
-    for k, size in enumerate(np.abs(e).tolist()):
+    sizes, patience = np.abs(e), math.ceil(CONSTANTS.patience / T_s)
+    if n_beyond == 0 and sizes.max() <= CONSTANTS.gate * (largest + fastest):  # no NaN, and nothing beyond
+        return believed, InnovationGate()
+    for k, size in enumerate(sizes.tolist()):
         n_missing += 1
         if not believed[k]:
             continue
