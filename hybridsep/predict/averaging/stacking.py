@@ -1,11 +1,13 @@
 """Stack of experts: the convex sum of their predictions that would have erred least so far."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...base.signals import Array
+from ...base.signals import Array, Indices
 from .constants import CONSTANTS
 from .experts import ARX_COMMAND, ARX_RESIDUAL, EXPERTS, RECALL, STATIC, Expert, Regression
 
@@ -50,7 +52,8 @@ class Stack:
         total, rows = evidence = gamma * self.evidence + np.array([measured @ measured, n])
         least_sum = float(np.min(total - 2.0 * cross + np.diag(gram), initial=total))
         ridge = kappa * max(least_sum / rows, least, _LEAST_SQUARE) * n
-        weights = simplex_minimum(gram + ridge * np.eye(len(EXPERTS)), cross + ridge * prior)
+        hessian, linear = gram + ridge * np.eye(len(EXPERTS)), cross + ridge * prior
+        weights = simplex_minimum(hessian, linear, self.weights > 0.0)
         return Stack(weights, gram, cross, evidence)
 
     def others(self) -> Array:
@@ -84,26 +87,41 @@ def _first_weights() -> Array:
     return np.array([one.first_weight for one in EXPERTS])
 
 
-def simplex_minimum(hessian: Array, linear: Array) -> Array:
+def simplex_minimum(hessian: Array, linear: Array, likely: NDArray[np.bool_] | None = None) -> Array:
     """Return the ``π ≥ 0``, ``Σπ ≤ 1`` that minimises ``½ πᵀHπ − lᵀπ``, ``(n,)``, by its active set.
 
-    ``hessian``, (n, n): positive definite; ``n`` is small: ``2ⁿ`` sets are tried; ``linear``, (n,).
+    ``hessian``, (n, n): positive definite; ``linear``, (n,); ``likely``, (n,): set that is tried first. ``n`` is small:
+    if that one does not meet the optimality conditions, all ``2ⁿ`` are tried.
     """
-    n = len(linear)
-    best, least = np.zeros(n), 0.0
-    for size in range(1, n + 1):
-        supports = np.array(list(combinations(range(n), size)))
-        H, free = hessian[supports[:, :, None], supports[:, None, :]], linear[supports]
-        found, of_ones = np.moveaxis(_solved(H, np.stack((free, np.ones_like(free)), axis=-1)), -1, 0)
-        excess = np.maximum(found.sum(axis=-1) - 1.0, 0.0)  # then Σπ = 1
-        found -= (excess / of_ones.sum(axis=-1))[:, None] * of_ones
-        cost = 0.5 * np.einsum("si,sij,sj->s", found, H, found) - np.einsum("si,si->s", free, found)
-        cost[~(found >= 0.0).all(axis=-1)] = np.inf
-        first = int(cost.argmin())
-        if cost[first] < least:
-            best, least = np.zeros(n), float(cost[first])
-            best[supports[first]] = found[first]
-    return best
+    able = (linear > 0.0) | (hessian < 0.0).any(axis=1)  # the others weigh nothing
+    if likely is not None and (support := np.flatnonzero(able & likely)).size:
+        best, cost = _least_of(hessian, linear, support[None])
+        slope = hessian @ best - linear
+        if cost < 0.0 and (slope[able & ~likely] > slope[support].max()).all():
+            return best
+    places = np.flatnonzero(able)
+    found = [_least_of(hessian, linear, places[subsets]) for subsets in _subsets(len(places))]
+    best, cost = min(found, key=lambda one: one[1], default=(np.zeros(len(linear)), 0.0))
+    return best if cost < 0.0 else np.zeros(len(linear))
+
+
+@cache
+def _subsets(n: int) -> tuple[Indices, ...]:
+    """Return all subsets of n places that are not empty, ``(m, size)`` of each size."""
+    return tuple(np.array(list(combinations(range(n), size))) for size in range(1, n + 1))
+
+
+def _least_of(hessian: Array, linear: Array, supports: Indices) -> tuple[Array, float]:
+    """Return the best π on some supports, ``(m, size)``, and its cost; infinite if it is negative on all."""
+    H, free = hessian[supports[:, :, None], supports[:, None, :]], linear[supports]
+    found, of_ones = np.moveaxis(_solved(H, np.stack((free, np.ones_like(free)), axis=-1)), -1, 0)
+    excess = np.maximum(found.sum(axis=-1) - 1.0, 0.0)  # then Σπ = 1
+    found -= (excess / of_ones.sum(axis=-1))[:, None] * of_ones
+    cost = 0.5 * np.einsum("si,sij,sj->s", found, H, found) - np.einsum("si,si->s", free, found)
+    cost[~(found >= 0.0).all(axis=-1)] = np.inf
+    first, best = int(cost.argmin()), np.zeros(len(linear))
+    best[supports[first]] = found[first]
+    return best, float(cost[first])
 
 
 def _solved(H: Array, right: Array) -> Array:
