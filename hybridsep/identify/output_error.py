@@ -6,7 +6,7 @@ projection (Golub, Pereyra, Inverse Problems 19 (2003) R1), so that the search i
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -159,7 +159,7 @@ class Problem:
         self, segments: Sequence[Segment], T_s: float, structure: Structure, delay: Delay, rows_max: int
     ) -> None:
         self._structure = structure
-        self._section = partial(polynomials, T_s=T_s, input_hold=delay.input_hold, zero=structure.zero)
+        self._section = cache(partial(polynomials, T_s=T_s, input_hold=delay.input_hold, zero=structure.zero))
         used = [segment for segment in segments if segment.known[: segment.stop].sum() > 1]
         step = max(1, sum(s.stop for s in used) // rows_max)
         self._data = [
@@ -168,6 +168,7 @@ class Problem:
             for rows in [np.flatnonzero(s.known[: s.stop])[::step]]
             for impulse in [np.append(1.0, np.full(s.stop - 1, _LEAST))]
         ]
+        self._rows = cache(lambda i, n: self._data[i][2] + _LEAD - np.arange(n)[:, None])
         self._divided = lru_cache(8 * len(used))(self._divided_by)
         self._last = lru_cache(2)(self._solved)  # a search asks twice for its start, and for each point that it takes
 
@@ -245,7 +246,7 @@ class Problem:
         once, (u, impulse) = self._late(self._divided(i, 1, theta)[0], n + 1, i), self._divided(i, 2, theta)
         twice, impulse = self._late(u, 2 * n + 1, i), self._late(impulse, 2 * n, i)
         for step in _STEP * np.eye(n):
-            (b_0, a_0), (b_1, a_1) = self._section(theta - step), self._section(theta + step)
+            (b_0, a_0), (b_1, a_1) = (self._section(tuple(one)) for one in (theta - step, theta + step))
             b_slope, a_slope = (b_1 - b_0) / (2.0 * _STEP), (a_1 - a_0) / (2.0 * _STEP)
             by_command.append(b_slope @ once - np.stack([np.convolve(one, a_slope) for one in b]) @ twice)
             by_state.append(-np.stack([np.convolve(one, a_slope) for one in np.eye(n)]) @ impulse)
@@ -258,8 +259,7 @@ class Problem:
 
     def _late(self, signal: Array, n: int, i: int) -> Array:
         """Return the rows of a signal as it is, and 1 to n − 1 samples late, ``(n, m)``."""
-        rows = self._data[i][2] + _LEAD
-        return np.asarray(signal[rows - np.arange(n)[:, None]])
+        return signal.take(self._rows(i, n))
 
 
 def without(nuisance: Array, signals: Array) -> Array:
