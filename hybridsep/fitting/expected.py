@@ -101,7 +101,7 @@ class Trial:
             residual = np.pad(residual, (delay, late), constant_values=(at_rest, 0.0))
             # Behind its end the command goes on, as plans would see a stop in it that never comes
             further = x_d[-1] + np.diff(x_d[-2:]).sum() * np.arange(1, delay + 1)
-            command, state, on_the_way = np.append(x_d, further), discrete.rest(), deque([start] * late)
+            command, drive, on_the_way = np.append(x_d, further), discrete.stepper(), deque([start] * late)
             x_dm, true = np.empty((2, delay + len(x_d)))
             with ExitStack() as stack:
                 ahead: FmuController | LibraryController = LibraryController(own, 0.0 if i else None)
@@ -109,11 +109,10 @@ class Trial:
                     ahead = FmuController(in_fmu, {**known.to_fmi(), **own.settings.to_fmi()})
                     stack.enter_context(ahead)
                 ahead.initialise(start)
-                for k, x_d_ahead in enumerate(command.tolist()):
-                    x_dm[k] = ahead.outputs()[0][0]
-                    moved, state = discrete.forced_response(state, x_dm[k : k + 1] - start)
-                    true[k] = moved[0] + start + residual[k]
-                    on_the_way.append(true[k])
+                for k, (x_d_ahead, r) in enumerate(zip(command.tolist(), residual.tolist(), strict=True)):
+                    x_dm[k] = sent = ahead.outputs()[0][0]
+                    true[k] = x_meas = drive(sent - start) + start + r
+                    on_the_way.append(x_meas)
                     ahead.step(k, x_d_ahead, on_the_way.popleft())
             x_dm, true = x_dm[delay:][:n], true[delay:][:n]
             found.append(Expected(x_d[:n] - x[late:], x_d[:n] - true, x_d[:n], x_dm))

@@ -117,15 +117,8 @@ def _look_ahead_rows(spec: FmuSpec) -> Rows:
 
 def _linear_drive(machine: Machine) -> Callable[[float], float]:
     """Return a function of ``x_d(k)`` that gives the measured ``x(k)`` of the physics model 2 % off."""
-    discrete = machine.model.discretise(machine.T_s, machine.physics.input_hold)
-    state, encoder = discrete.rest(), Encoder(_NOISE_STD, 0)
-
-    def measure(x_d: float) -> float:
-        nonlocal state
-        x, state = discrete.forced_response(state, np.array([x_d]))
-        return encoder.measure(_GAIN * float(x[0]))
-
-    return measure
+    drive, encoder = machine.model.discretise(machine.T_s, machine.physics.input_hold).stepper(), Encoder(_NOISE_STD, 0)
+    return lambda x_d: encoder.measure(_GAIN * drive(x_d))
 
 
 def _csv(T_s: float, columns: Iterable[tuple[str, str]], rows: Iterable[Iterable[float]], decimals: int) -> bytes:

@@ -1,5 +1,7 @@
 """Discrete-time physics model under a zero- or first-order hold, exact at the samples; eq. (2)."""
 
+from collections import deque
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -82,6 +84,23 @@ class DiscreteModel:
                 stop = min(i + self._block, n)
                 x_pb[i:stop], s = self._block_response(s, u[i:stop])
         return x_pb, (np.concatenate((s, register)) if self.dead_time else s)
+
+    def stepper(self) -> Callable[[float], float]:
+        """Return a function of the next command that gives the position under it, from rest on, sample by sample.
+
+        It rounds otherwise than :meth:`forced_response`, in a tenth of its time.
+        """
+        late, signals = deque([0.0] * self.dead_time), np.zeros(self._n + 1)  # state, and the command
+        rows = np.vstack((np.append(self.c, self.d), np.column_stack((self.A, self.b))))
+
+        def step(command: float) -> float:
+            late.append(command)
+            signals[-1] = late.popleft()
+            found = rows.dot(signals)
+            signals[:-1] = found[1:]
+            return float(found[0])
+
+        return step
 
     def impulse_response(self, n: int) -> Array:
         """Return the first column of the lower-triangular Toeplitz ``G_pb`` of a window, ``(n,)``, m/m."""
