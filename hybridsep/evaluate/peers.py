@@ -14,7 +14,7 @@ from scipy.interpolate import Akima1DInterpolator
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dtrcon
 from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter, lfiltic
+from scipy.signal import lfilter
 
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
@@ -41,12 +41,12 @@ class FirstOrderLag:
 
 def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
     """Return the lag that fits commanded and measured positions ``(n,)``, m, NaN where missing, best."""
-    recordings = [one for one in recordings if not np.isnan(one[1]).all()]
+    known = [(x_d, x, there) for x_d, x in recordings if (there := ~np.isnan(x)).any()]
 
     def misfit(log_tau: float, late: int) -> float:
         lag = FirstOrderLag(math.exp(log_tau), late)
-        errors = [x - lag.position(x_d) for x_d, x in recordings]
-        return float(sum(np.nansum((error - np.nanmean(error)) ** 2) for error in errors))  # their zeros may differ
+        errors = [(x - lag.position(x_d))[there] for x_d, x, there in known]
+        return float(sum(np.sum((error - error.mean()) ** 2) for error in errors))  # their zeros may differ
 
     bounds = [math.log(samples) for samples in _TIME_CONSTANTS]
     fits = [(minimize_scalar(misfit, bounds=bounds, args=(n,), method="bounded"), n) for n in range(_LATE_MAX + 1)]
@@ -141,7 +141,7 @@ class ArxRun:
         forced = np.convolve(np.pad(steps, (end - begin + n - len(steps), 0)), b, "valid") + c
         with np.errstate(over="ignore", invalid="ignore"):  # a run that diverges is seen by its size
             denominator = np.concatenate(([1.0], -a))
-            before = lfiltic([1.0], denominator, self._filled[begin : begin + n][::-1])
+            before = np.correlate(a, self._filled[begin : begin + n][::-1], "full")[n - 1 :]  # lfiltic, in a step
             return np.asarray(lfilter([1.0], denominator, forced, zi=before)[0])
 
 
