@@ -4,6 +4,7 @@ The linear parameters, a constant offset and the state at the start of each segm
 projection (Golub, Pereyra, Inverse Problems 19 (2003) R1), so that the search is only over poles.
 """
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
@@ -87,7 +88,7 @@ tell the same."""
 _DEPENDENT = 1e-12  # size of a direction, relative to the largest, below which columns of unit norm do not span it
 _STEP = 1e-5  # step of the differences of responses, in the logarithm of a parameter
 
-_LEAST = 1e-290  # goes on after an impulse: numbers that underflow take many times as long
+_FADED = 1e-30  # size of the response to an impulse from which on it counts as over
 _LEAD = 4  # zeros before a command: of a second order the numerators of derivatives look so far back
 
 _EDGE = 0.01  # distance from a bound, in the logarithm of a parameter, within which it counts as at the bound
@@ -163,10 +164,9 @@ class Problem:
         used = [segment for segment in segments if segment.known[: segment.stop].sum() > 1]
         step = max(1, sum(s.stop for s in used) // rows_max)
         self._data = [
-            (np.pad(np.stack((delayed(s.u[: s.stop], delay.samples), impulse)), ((0, 0), (_LEAD, 0))), s.y[rows], rows)
+            (np.pad(delayed(s.u[: s.stop], delay.samples), (_LEAD, 0)), s.y[rows], rows)
             for s in used
             for rows in [np.flatnonzero(s.known[: s.stop])[::step]]
-            for impulse in [np.append(1.0, np.full(s.stop - 1, _LEAST))]
         ]
         self._rows = cache(lambda i, n: self._data[i][2] + _LEAD - np.arange(n)[:, None])
         self._divided = lru_cache(8 * len(used))(self._divided_by)
@@ -225,7 +225,7 @@ class Problem:
 
         The filters run over every sample; some samples, all of them measured, have residuals.
         """
-        (u, _), y, _ = self._data[i]
+        u, y, _ = self._data[i]
         found = [self._responses_of(i, part) for part in self.parts(theta)]
         forced = [one[:1] for one, _ in found] + [one[1:] for one, _ in found] or [self._late(u, 1, i)]
         columns, target = affine(self._structure, np.concatenate(forced).T, y)
@@ -252,10 +252,17 @@ class Problem:
             by_state.append(-np.stack([np.convolve(one, a_slope) for one in np.eye(n)]) @ impulse)
         return np.stack(by_command), np.stack(by_state)
 
-    def _divided_by(self, i: int, times: int, theta: tuple[float, ...]) -> Array:
+    def _divided_by(self, i: int, times: int, theta: tuple[float, ...]) -> tuple[Array, Array]:
         """Return a command, and an impulse, divided once or twice by the denominator of a mode, or of the lag."""
-        signals = self._data[i][0] if times == 1 else self._divided(i, times - 1, theta)
-        return np.asarray(lfilter([1.0], self._section(theta)[1], signals))
+        u, a = self._data[i][0], self._section(theta)[1]
+        u, impulse = (u, np.eye(1, len(u), _LEAD)[0]) if times == 1 else self._divided(i, times - 1, theta)
+        half, product = -0.5 * a[1], a[2] if len(theta) == 2 else 0.0
+        slowest = half + math.sqrt(half**2 - product) if half**2 > product else math.sqrt(product)
+        n, found = len(u), np.zeros(len(u))
+        if slowest < 1.0:
+            n = min(n, _LEAD + 4 + int(math.log(_FADED) / math.log(max(slowest, _FADED))))
+        found[:n] = lfilter([1.0], a, impulse[:n])
+        return lfilter([1.0], a, u), found
 
     def _late(self, signal: Array, n: int, i: int) -> Array:
         """Return the rows of a signal as it is, and 1 to n − 1 samples late, ``(n, m)``."""
