@@ -88,17 +88,17 @@ class DiscreteModel:
     def stepper(self) -> Callable[[float], float]:
         """Return a function of the next command that gives the position under it, from rest on, sample by sample.
 
-        It rounds otherwise than :meth:`forced_response`, in a tenth of its time.
+        It gives what :meth:`forced_response` does, in a fifth of its time.
         """
-        late, signals = deque([0.0] * self.dead_time), np.zeros(self._n + 1)  # state, and the command
-        rows = np.vstack((np.append(self.c, self.d), np.column_stack((self.A, self.b))))
+        s, late, now, by_command = np.zeros(self._n), deque([0.0] * self.dead_time), self._O[0], self._K[:, -1]
 
         def step(command: float) -> float:
+            nonlocal s
             late.append(command)
-            signals[-1] = late.popleft()
-            found = rows.dot(signals)
-            signals[:-1] = found[1:]
-            return float(found[0])
+            command = late.popleft()
+            x_pb = float(now.dot(s)) + self.d * command
+            s = self.A.dot(s) + by_command * command
+            return x_pb
 
         return step
 
