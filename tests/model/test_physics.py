@@ -204,6 +204,7 @@ def test_pieces_equal_one_piece(lengths: list[int], dead_time: int, hold: str, b
     discrete = model.discretise(TS, hold, block=block)
     x_d = command(sum(lengths))
     whole, end = model.discretise(TS, hold).forced_response(discrete.rest(), x_d)
+    np.testing.assert_allclose([*map(discrete.stepper(), x_d.tolist())], whole, rtol=0, atol=1e-16)
     state, pieces = discrete.rest(), []
     for piece in np.split(x_d, np.cumsum(lengths)[:-1]):
         x_pb, state = discrete.forced_response(state, piece)

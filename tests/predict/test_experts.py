@@ -152,6 +152,7 @@ def test_the_minimum_meets_its_optimality_conditions(n: int, rank: int, ridge: f
     A = rng.normal(size=(rank, n))
     H, linear = scale * (A.T @ A + ridge * np.eye(n)), scale * rng.normal(size=n) * rng.choice([0.1, 1.0, 10.0])
     found = simplex_minimum(H, linear)
+    np.testing.assert_allclose(simplex_minimum(H, linear, rng.random(n) < 0.5), found, rtol=0, atol=1e-6)
     assert (found >= 0.0).all()
     # Of an all but singular H the minimum without Σπ ≤ 1 is far away, and the way back from it is rounded.
     assert found.sum() <= 1.0 + 1e-9 + 1e-15 * np.abs(np.linalg.solve(H, linear)).sum()
