@@ -172,7 +172,8 @@ def moves(arm: Arm, seed: int, duration: float) -> Array:
         u = np.arange(1, round(time / T_S) + 1)[:, None] / round(time / T_S)
         pieces.append(begin + (goal - begin) * (10 * u**3 - 15 * u**4 + 6 * u**5))
         pieces.append(np.tile(goal, (round(rng.uniform(0.0, 0.4) / T_S), 1)))
-    return np.concatenate(pieces)[:n]
+    commands = np.concatenate(pieces[:-2])  # a move that there is no time for is left out: programs end at rest
+    return np.pad(commands, ((0, n - len(commands)), (0, 0)), mode="edge")
 
 
 def measured(x: Array) -> Array:
