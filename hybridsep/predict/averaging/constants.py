@@ -79,6 +79,10 @@ class AveragingConstants:
     # time in which a recalled residual loses that it was moved to the last one, in windows: without an end, drives that
     # are repeated have to 7 times the error
     recall_fade: float = 0.5
+    # repeats, behind a compensator, from which on one more changes the memory of a part by a share: without, what the
+    # physics model has wrong grows from pass to pass, and the tenth of a belt axis has 1.3 times the error
+    recall_repeats: float = 3.5
+    recall_share: float = 0.7
     # effect of a disturbance's first difference relative to its own: it only corrects the timing
     difference_share: float = 0.03
     # largest residual that is believed, relative to the largest so far and the physics model's fastest step so far

@@ -215,10 +215,7 @@ class ExpertWindow:
 
     @property
     def growth(self) -> float:
-        """Largest step of the command relative to that before the window, ≥ 1.
-
-        What follows the command alone is linear in it: it may be larger than anything so far by as much.
-        """
+        """Largest step of the command relative to those before, ≥ 1: what is linear in it may be larger by as much."""
         before = self.model.learned.largest_step
         return min(self.scales.step / before, CONSTANTS.velocity_jump) if before > 0.0 else 1.0
 

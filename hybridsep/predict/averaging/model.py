@@ -142,10 +142,7 @@ class AveragedModel:
     def init(
         cls, settings: PredictorSettings, discrete: DiscreteModel, own: tuple[Disturbance, ...] = ()
     ) -> AveragedModel:
-        """Return the model at rest, with nothing learned.
-
-        ``discrete``: ``G_pb``; ``own``: the user's own disturbances.
-        """
+        """Return the model at rest, with nothing learned; ``discrete``: ``G_pb``, ``own``: the user's disturbances."""
         static = StaticFeatures(discrete, settings.q, settings.period, own)
         evidence = WarmStartRows.init(static.n + settings.p), WarmStartRows.init(2 * static.command.p + 2)
         learned, noise, leader = Learned.init(static.n), (0.0,) * len(REGRESSIONS), ARX_RESIDUAL.place
@@ -231,10 +228,7 @@ class AveragedModel:
         return replace(self, learned=learned, evidence=(of_physics, of_command))
 
     def scales_of(self, window: ResidualWindow) -> tuple[FeatureScales, StaticRows]:
-        """Return the scales of the features, with the next window's, and its features for ``x_pb``.
-
-        A compensator begins to move before its path, with a creep.
-        """
+        """Return the scales of the features, a compensator's with its creep, and the window's features for ``x_pb``."""
         static, learned, settings = self.static, self.learned, self.settings
         before = learned.velocity_scale
         peak = static.peak_velocity(np.append(self.run.static.x_d[-1:], window.x_d), window.start)
@@ -296,10 +290,7 @@ class AveragedModel:
         return AveragedForecast(window, e_h, variance, scales, of_physics, x, stacked, predictions, shares, memory)
 
     def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> AveragedForecast:
-        """Predict the residual over the next window.
-
-        ``scales``: by :meth:`scales_of` from its commands if left out; a compensator takes its preview's.
-        """
+        """Predict the residual over the next window; ``scales``: a compensator's, else by :meth:`scales_of`."""
         of_physics = None
         if scales is None:
             scales, of_physics = self.scales_of(window)
@@ -351,7 +342,7 @@ class AveragedModel:
             state = _judged(state, forecast, (e, e_0), accepted, ahead) if accepted.any() else state
         past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
         n_rejected = run.n_rejected + m - int(accepted.sum())
-        memory = forecast.memory.remember(e)
+        memory = forecast.memory.remember(e, len(window.raw_commands) if self.static.n_known is not None else 0)
         run = RunState(static, (past[0], past[1]), gate, n_rejected, memory, run.level)
         return replace(state, run=run), accepted
 

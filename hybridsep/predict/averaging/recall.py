@@ -5,7 +5,8 @@ residuals. For each lag ``τ`` a sum ``D_τ ← γ D_τ + (Δu(k) − Δu(k−τ
 much the commands ahead, and those before them, are like those ``τ`` samples before; it fades in as many as are
 predicted. The lag with the least gives the residuals that were measured then. Behind a compensator it is the shortest
 of those that are alike: what the drive was told then is most like what it is told now. They count by
-``1/(1 + (D_τ/S)/ρ²)``, with the same sum ``S`` of the changes themselves, and a tolerance ``ρ``.
+``1/(1 + (D_τ/S)/ρ²)``, with the same sum ``S`` of the changes themselves, and a tolerance ``ρ``. There a part that came
+some times is remembered as a mean, which fades: with the last one alone what the physics model has wrong would grow.
 """
 
 import math
@@ -30,6 +31,7 @@ class Memory:
 
     commands: Array  # (n + stride,), m: as they came, as far as they are known, relative to the start
     residuals: Array  # (n,), m: of the physics model, as far as they are measured
+    repeats: Array  # (n,): how often each came before, as far as it was alike
     distances: Array  # (n,), m²: ``D_τ`` of the lags n … 1
     moved: float  # m²: ``S``
     n_ahead: int  # commands that are known ahead of those that were predicted
@@ -37,19 +39,19 @@ class Memory:
     @classmethod
     def init(cls, n: int, Np: int) -> "Memory":
         """Return a memory of ``n`` samples of a run at rest, for windows of ``Np``."""
-        return cls(np.zeros(n + max(1, Np // _UPDATES)), np.zeros(n), np.zeros(n), 0.0, 0)
+        return cls(np.zeros(n + max(1, Np // _UPDATES)), np.zeros(n), np.zeros(n), np.zeros(n), 0.0, 0)
 
     def restart(self) -> "Memory":
         """Return the memory at the beginning of another run, at rest at its start, after a sample without residual.
 
         Commands that were known ahead and never measured are forgotten: each command stands beside its residual.
         """
-        n_measured = max(len(self.commands) - self.n_ahead, 0)
+        n_measured, size = max(len(self.commands) - self.n_ahead, 0), len(self.residuals)
         unknown = np.full(len(self.commands) - n_measured, self.commands[0])
         commands = np.concatenate((unknown, self.commands[:n_measured]))
         commands = np.append(commands[1:], commands[-1]) - commands[-1]
-        residuals = np.append(self.residuals[1:], 0.0)[: len(self.residuals)]  # also with no memory
-        return Memory(commands, residuals, np.zeros_like(self.distances), 0.0, 0)
+        residuals, repeats = (np.append(one[1:], 0.0)[:size] for one in (self.residuals, self.repeats))  # size may be 0
+        return Memory(commands, residuals, repeats, np.zeros(size), 0.0, 0)
 
     def append_commands(self, path: Array, n_known: int | None, Np: int) -> "Memory":
         """Return the memory that knows the first ``n_known`` commands of those to predict, ``(m,)``, m."""
@@ -71,25 +73,34 @@ class Memory:
         n_ahead = max(self.n_ahead, len(path[:n_known]))
         return replace(self, commands=commands[len(new) :], distances=distances, moved=moved, n_ahead=n_ahead)
 
-    def recalled(self, n: int, *, modified: bool = False) -> tuple[Array, float, float]:
-        """Return residuals after the commands most like those ahead, ``(n,)``, m, the one before, and how they count.
+    def found(self, n: int, *, modified: bool = False) -> tuple[int, float]:
+        """Return the place of the residuals after the commands most like those ahead, and how they count.
 
-        They do not if the memory is shorter.
-
-        ``n``: samples from the last measured one to the last known command; ``modified``: whether a compensator tells
-        the drive others.
+        0 and 0 if the memory is shorter. ``n``: samples from the last measured one to the last known command;
+        ``modified``: whether a compensator tells the drive others.
         """
         size = len(self.residuals)
         if size <= n:
-            return np.zeros(n), 0.0, 0.0
+            return 0, 0.0
         compared = np.maximum(self.distances, _SAME * self.moved if modified else 0.0)
-        lag = n + int(np.argmin(compared[1 : size - n + 1][::-1]))  # the shortest lag of equals
-        distance, tolerated = float(self.distances[size - lag]), CONSTANTS.recall_tolerance**2 * self.moved
-        alike = tolerated / (tolerated + distance) if distance > 0.0 else 0.0
-        return self.residuals[size - lag : size - lag + n], float(self.residuals[size - lag - 1]), alike
+        place = size - n - int(np.argmin(compared[1 : size - n + 1][::-1]))  # the shortest lag of equals
+        distance, tolerated = float(self.distances[place]), CONSTANTS.recall_tolerance**2 * self.moved
+        return place, tolerated / (tolerated + distance) if distance > 0.0 else 0.0
 
-    def remember(self, residuals: Array) -> "Memory":
-        """Return the memory with the residuals of measured samples, ``(m,)``, m."""
-        m = len(residuals)
-        both = np.concatenate((self.residuals, residuals))
-        return replace(self, residuals=both[m:], n_ahead=max(self.n_ahead - m, 0))
+    def recalled(self, n: int, *, modified: bool = False) -> tuple[Array, float, float]:
+        """Return the residuals that are :meth:`found`, ``(n,)``, m, the one before, and how they count."""
+        place, alike = self.found(n, modified=modified)
+        residuals, before = (
+            (self.residuals[place : place + n], self.residuals[place - 1]) if place else (np.zeros(n), 0)
+        )
+        return residuals, float(before), alike
+
+    def remember(self, e: Array, n: int = 0) -> "Memory":
+        """Return the memory with residuals of measured samples, ``(m,)``, m; ``n``: behind a compensator, as above."""
+        m, (place, alike) = len(e), self.found(n, modified=True) if n else (0, 0.0)
+        then, repeats = (self.residuals, alike * (self.repeats + 1.0)) if place else (e, np.zeros(m))
+        then, repeats = then[place : place + m], repeats[place : place + m]
+        kept = np.where(repeats < CONSTANTS.recall_repeats, 0.0, (1.0 - CONSTANTS.recall_share) * alike)
+        residuals = np.concatenate((self.residuals, e + kept * (then - e)))[m:]
+        repeats = np.concatenate((self.repeats, repeats))[m:]
+        return replace(self, residuals=residuals, repeats=repeats, n_ahead=max(self.n_ahead - m, 0))

@@ -27,9 +27,12 @@ typedef struct {
     hsep_int commands;   /* (stride,) m, the last ones, ring */
     hsep_int changes;    /* (size + stride,) m, ring: older ones are overwritten while these are compared */
     hsep_int residuals;  /* (size,) m, ring */
+    hsep_int repeats;    /* (size,) how often each came before, as far as it was alike, ring */
     hsep_int distances;  /* (size,) m2, of the lags 1 ... size */
+    hsep_int found;      /* lag that the window is recalled with, */
+    hsep_real alike;     /* and how much that counts */
 } hsep_recall;
-HSEP_ASSERT_WORDS(hsep_recall, 17);
+HSEP_ASSERT_WORDS(hsep_recall, 20);
 
 /* It is all that a block of 0 needs to be at rest. */
 static inline hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predictor_parameters *parameters)
@@ -44,6 +47,7 @@ static inline hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predic
     self->commands = hsep_take(&end, (hsep_real)self->stride);
     self->changes = hsep_take(&end, (hsep_real)(self->size + self->stride));
     self->residuals = hsep_take(&end, (hsep_real)self->size);
+    self->repeats = hsep_take(&end, (hsep_real)self->size);
     self->distances = hsep_take(&end, (hsep_real)self->size);
     return end * sizeof(hsep_real);
 }
@@ -112,18 +116,26 @@ static inline void hsep_recall_append_command(hsep_recall *self, hsep_real comma
     self->heard = self->heard + 1 < self->Np ? self->heard + 1 : 0;
 }
 
-/* Take in the residuals of the window, (Np,), m, newest first. */
+/* Take in the residuals of the window, (Np,), m, newest first. Behind a compensator a part that came some times is
+ * remembered as a mean, which fades. */
 static inline void hsep_recall_remember(hsep_recall *self, const hsep_real e[])
 {
+    hsep_real *residuals = hsep_at(self, self->residuals), *repeats = hsep_at(self, self->repeats);
+    const hsep_real alike = self->same > 0.0 ? self->alike : 0.0;
     for (hsep_int j = self->size > 0 ? self->Np : 0; j-- > 0;) {
         self->remembered = (self->remembered > 0 ? self->remembered : self->size) - 1;
-        hsep_at(self, self->residuals)[self->remembered] = e[j];
+        const hsep_int then = (self->remembered + self->found) % self->size;
+        const hsep_real count = alike * (repeats[then] + 1.0);
+        const hsep_real kept =
+            count < HSEP_AVERAGING_RECALL_REPEATS ? 0.0 : (1.0 - HSEP_AVERAGING_RECALL_SHARE) * alike;
+        residuals[self->remembered] = e[j] + kept * (residuals[then] - e[j]);
+        repeats[self->remembered] = count;
     }
 }
 
 /* Residuals after the commands most like those ahead, (n,), m, newest first, moved to the last one, which fades. Return
  * how much they count, 0 ... 1; 0 if the memory is shorter. */
-static inline hsep_real hsep_recall_forecast(const hsep_recall *self, hsep_real last, hsep_real recalled[])
+static inline hsep_real hsep_recall_forecast(hsep_recall *self, hsep_real last, hsep_real recalled[])
 {
     const hsep_real *residuals = hsep_at_const(self, self->residuals);
     const hsep_real tolerated = HSEP_AVERAGING_RECALL_TOLERANCE * HSEP_AVERAGING_RECALL_TOLERANCE * self->moved;
@@ -138,7 +150,9 @@ static inline hsep_real hsep_recall_forecast(const hsep_recall *self, hsep_real 
         recalled[n - 1 - k] = residuals[(self->remembered + lag - 1 - k) % self->size] + (last - before) * fade;
     }
     const hsep_real distance = hsep_at_const(self, self->distances)[lag - 1];
-    return distance > 0.0 ? tolerated / (tolerated + distance) : 0.0;
+    self->found = lag;
+    self->alike = distance > 0.0 ? tolerated / (tolerated + distance) : 0.0;
+    return self->alike;
 }
 
 #endif
