@@ -67,6 +67,15 @@ def test_a_path_that_is_known_further_ahead_is_heard_once() -> None:
     np.testing.assert_array_equal(memory.commands, plain.commands)
 
 
+def test_behind_a_compensator_repeats_from_the_fourth_on_count_by_a_share() -> None:
+    rng = np.random.default_rng(2)
+    steps, memory = rng.normal(size=80), Memory.init(SIZE, 20)
+    path = np.concatenate(([0.0], np.cumsum(np.tile(steps - steps.mean(), 7))[:-1]))
+    for k in range(0, 560, 20):
+        memory = memory.append_commands(path[k : k + 20], None, 20).remember(np.full(20, float(k // 80)), 20)
+    np.testing.assert_allclose(memory.residuals[-80:], 0.7 * 6 + 0.3 * (0.7 * 5 + 0.3 * 4), rtol=1e-4)
+
+
 def test_a_memory_shorter_than_a_window_recalls_nothing() -> None:
     for memory in (Memory.init(20, 20), Memory.init(0, 20)):
         residuals, _, alike = memory.append_commands(np.arange(20.0), None, 20).remember(np.ones(20)).recalled(20)

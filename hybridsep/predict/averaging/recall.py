@@ -74,10 +74,9 @@ class Memory:
         return replace(self, commands=commands[len(new) :], distances=distances, moved=moved, n_ahead=n_ahead)
 
     def found(self, n: int, *, modified: bool = False) -> tuple[int, float]:
-        """Return the place of the residuals after the commands most like those ahead, and how they count.
+        """Return the place of the residuals after the commands most like those ahead, and how they count; or zeros.
 
-        0 and 0 if the memory is shorter. ``n``: samples from the last measured one to the last known command;
-        ``modified``: whether a compensator tells the drive others.
+        ``n``: samples from the last measured to the last known command; ``modified``: whether a compensator plans.
         """
         size = len(self.residuals)
         if size <= n:
@@ -90,10 +89,9 @@ class Memory:
     def recalled(self, n: int, *, modified: bool = False) -> tuple[Array, float, float]:
         """Return the residuals that are :meth:`found`, ``(n,)``, m, the one before, and how they count."""
         place, alike = self.found(n, modified=modified)
-        residuals, before = (
-            (self.residuals[place : place + n], self.residuals[place - 1]) if place else (np.zeros(n), 0)
-        )
-        return residuals, float(before), alike
+        if place == 0:
+            return np.zeros(n), 0.0, 0.0
+        return self.residuals[place : place + n], float(self.residuals[place - 1]), alike
 
     def remember(self, e: Array, n: int = 0) -> "Memory":
         """Return the memory with residuals of measured samples, ``(m,)``, m; ``n``: behind a compensator, as above."""
@@ -101,6 +99,5 @@ class Memory:
         then, repeats = (self.residuals, alike * (self.repeats + 1.0)) if place else (e, np.zeros(m))
         then, repeats = then[place : place + m], repeats[place : place + m]
         kept = np.where(repeats < CONSTANTS.recall_repeats, 0.0, (1.0 - CONSTANTS.recall_share) * alike)
-        residuals = np.concatenate((self.residuals, e + kept * (then - e)))[m:]
-        repeats = np.concatenate((self.repeats, repeats))[m:]
-        return replace(self, residuals=residuals, repeats=repeats, n_ahead=max(self.n_ahead - m, 0))
+        residuals, repeats = np.append(self.residuals, e + kept * (then - e)), np.append(self.repeats, repeats)
+        return replace(self, residuals=residuals[m:], repeats=repeats[m:], n_ahead=max(self.n_ahead - m, 0))
