@@ -122,7 +122,9 @@ class Chart:
     y_labels: tuple[str, ...]  # one a panel
     lines: Sequence[Line]
     caption: str = ""
-    x_log: bool = False  # whether the abscissa is logarithmic
+    # whether an axis is logarithmic
+    x_log: bool = False
+    y_log: bool = False
 
     def figure(self) -> "Figure":
         """Return it as plotly's figure."""
@@ -133,8 +135,8 @@ class Chart:
         for line in self.lines:
             line.draw(figure)
         figure.update_layout(_LAYOUT, height=_HEIGHT if n == 1 else n * _HEIGHT_OF_SEVERAL)
-        figure.update_xaxes(_AXES | ({"type": "log", "dtick": 1} if self.x_log else {}))
-        figure.update_yaxes(_AXES)
+        for update, log in ((figure.update_xaxes, self.x_log), (figure.update_yaxes, self.y_log)):
+            update(_AXES | ({"type": "log", "dtick": 1} if log else {}))
         figure.update_xaxes(title_text=self.x_label, row=n)
         for i, label in enumerate(self.y_labels):
             figure.update_yaxes(title_text=label, row=i + 1)

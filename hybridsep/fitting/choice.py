@@ -18,7 +18,7 @@ from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
 from .replay import Recording, replay
 
-_WORTH = 0.05  # relative gain below which the default settings stay: less may be chance
+WORTH = 0.05  # relative gain below which the default settings stay: less may be chance
 _SHARES = (0.1, 0.25, 1.0)  # numbers of lags ``p`` that are tried besides the default, in windows
 _Q = (1,)  # numbers of lags ``q`` of the physics-based position that are tried besides the default
 _GAIN = 0.9  # ratio of the errors with and without a period below which it is worth a hint
@@ -71,7 +71,7 @@ def choose_settings(
             errors.append(math.inf)
         progress((i + 1) / len(candidates))
     best = min(range(len(errors)), key=errors.__getitem__)
-    chosen = best if errors[best] < (1.0 - _WORTH) * errors[0] else 0
+    chosen = best if errors[best] < (1.0 - WORTH) * errors[0] else 0
     tried = [Tried(one.p, one.q, errors[i], i == chosen) for i, one in enumerate(candidates)]
     return candidates[chosen], tuple(tried)
 

@@ -166,6 +166,7 @@ class Fit:
         sections.write_findings(report, self.logs, self.findings)
         sections.write_identification(report, self.identification, judged)
         sections.write_validation(report, self.identification, judged)
+        sections.write_settings(report, self.choice, judged)
         if self.tracking is not None:
             report.heading("Compensation")
             for line in self.tracking.lines(judged.shown):

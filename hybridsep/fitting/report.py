@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import welch
 
 from ..base.metrics import coverage, moves_of
 from ..base.signals import Array
@@ -16,6 +17,7 @@ from ..logs.checks import Finding
 from ..logs.log import Log
 from ..logs.units import stated_unit
 from .advice import OF_ITSELF, Judged, advice_on, extent, peers_in_words
+from .choice import WORTH, Tried
 
 _NAMES = ("physics model", "hold the last residual", "hybrid")  # names of what a replay predicts by
 _COLOURS = (PHYSICS, HOLD, HYBRID)  # their colours
@@ -42,6 +44,7 @@ def begun_report(title: str, logs: Sequence[Log], judged: Judged, heading: str, 
     if not np.isnan(judged.replay.errors()[0]).all():  # else nothing judges
         _write_time(report, judged)
         _write_horizon(report, judged)
+        _write_spectra(report, judged)
     return report
 
 
@@ -149,6 +152,22 @@ def _correlations(test: ResidualTest, T_s: float) -> Chart:
     return Chart("lag [ms]", ("correlation",) * 2, lines, " ".join(words))
 
 
+def write_settings(report: Report, choice: Sequence[Tried], judged: Judged) -> None:
+    """Write the settings that were tried."""
+    scale, unit = judged.unit
+    report.heading("Settings")
+    rows = []
+    for one in choice:
+        rms = f"{scale * one.rms_h:.4g}" if math.isfinite(one.rms_h) else "diverged"
+        rows.append([str(one.p), str(one.q), rms, "chosen" if one.chosen else ""])
+    report.table(["p", "q", f"RMS [{unit}]", ""], rows)
+    report.paragraph(
+        "Errors of causal replays over the later half of the training samples. The first row, the default, stays "
+        f"unless another is better by {100 * WORTH:g} %.",
+        "dim",
+    )
+
+
 def _write_time(report: Report, judged: Judged) -> None:
     scale, unit = judged.unit
     replay = judged.replay
@@ -179,6 +198,19 @@ def _write_horizon(report: Report, judged: Judged) -> None:
     lines = [Line(name, ahead, row, colour) for name, row, colour in zip(_NAMES, horizon, _COLOURS, strict=True)]
     how = "How the error grows from the window's first sample on."
     report.chart(Chart("ahead [ms]", (f"RMS error [{unit}]",), lines, how))
+
+
+def _write_spectra(report: Report, judged: Judged) -> None:
+    scale, unit = judged.unit
+    errors = judged.replay.errors()
+    errors = errors[:, ~np.isnan(errors[0])]
+    if errors.shape[1] < 64:
+        return
+    f, power = welch(errors, 1.0 / judged.T_s, nperseg=min(2048, errors.shape[1]))
+    amplitude: Array = scale * np.sqrt(power)
+    lines = [Line(name, f[1:], row[1:], colour) for name, row, colour in zip(_NAMES, amplitude, _COLOURS, strict=True)]
+    report.heading("Spectra of the errors")
+    report.chart(Chart("frequency [Hz]", (f"density [{unit}/√Hz]",), lines, x_log=True, y_log=True))
 
 
 def write_moves(report: Report, judged: Judged, in_position: float) -> None:

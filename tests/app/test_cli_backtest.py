@@ -120,7 +120,7 @@ def test_the_page_has_the_figures_of_backtest(hybridsep: Run, log: Path, tmp_pat
     assert "my axis.csv" in text
     assert "began without any knowledge" in text
     assert "Nothing: time axis, samples, signs" in text
-    assert text.count('id="chart') == 2
+    assert text.count('id="chart') == 3
 
 
 @pytest.mark.slow

@@ -98,7 +98,7 @@ def test_the_report_says_what_to_do_and_shows_the_figures(fitted: Fit, built: di
     assert advice in page
     assert all(f"{1e6 * value:.4g}" in page for value in fitted.judged.replay.rms())
     assert "HybridPredictor_axis.fmu" in page
-    assert page.count('<div id="chart') == 4
+    assert page.count('<div id="chart') == 5
     estimated = {one.name: one.std > 0 for one in fitted.identification.parameters}
     assert not estimated["mode[1].beta"]
     for name, free in estimated.items():

@@ -41,7 +41,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     report.table(["name", "words"], [["<a>", "b & c"]], words=1)
     points = Line("</script>", [1.0, 2.0], [3.0, np.nan], "#ff0000", points=True)
     for caption in ("A caption", "<&>"):
-        report.chart(Chart("f [Hz]", ("<!--",), [points], caption, x_log=True))
+        report.chart(Chart("f [Hz]", ("<!--",), [points], caption, x_log=True, y_log=True))
     path = tmp_path_factory.mktemp("report") / "report.html"
     report.write(path)
     return path.read_text(encoding="utf-8")
