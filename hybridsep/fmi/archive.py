@@ -21,10 +21,7 @@ from .flavours import FLAVOURS, FMI_VERSIONS
 from .spec import FmuSpec, fmu_name, fmu_names
 from .weights import saved_weights
 
-_ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 _FIRST = ("modelDescription.xml", "SystemStructure.ssd")
-
-_LEVEL = 6  # of zlib's deflate; fixed, as another one, like another implementation, gives other bytes
 
 
 def build_fmu(
@@ -108,10 +105,12 @@ def archived(files: Mapping[str, bytes]) -> bytes:
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for arcname in sorted(files, key=lambda key: (key not in _FIRST, key)):
-            entry = zipfile.ZipInfo(arcname, _ZIP_TIME)
+            entry = zipfile.ZipInfo(arcname)  # of 1980, its default
             entry.external_attr, entry.create_system = 0o644 << 16, 3
             how = zipfile.ZIP_STORED if arcname.endswith(".fmu") else zipfile.ZIP_DEFLATED
-            archive.writestr(entry, files[arcname], how, _LEVEL)
+            archive.writestr(
+                entry, files[arcname], how, 6
+            )  # deflate's level is fixed, as another one gives other bytes
     return file.getvalue()
 
 

@@ -97,6 +97,9 @@ def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: by
     )
     said = "/* What was learned before, weights.bin: no file is needed for a warm start. */\n"
     learned = f"{said}{c_bytes('hsep_embedded_weights', weights)}\n\n" if weights else ""
+    embedded = (
+        ",\n    .weights = hsep_embedded_weights,\n    .weights_size = sizeof hsep_embedded_weights" if weights else ""
+    )
     text = f"""/* What fmi{fmi}Functions.h may put before the names of the FMI functions. */
 #ifndef FMI{fmi}_FUNCTION_PREFIX
 #define FMI{fmi}_FUNCTION_PREFIX {table.name}_
@@ -121,7 +124,7 @@ static const double hsep_starts[HSEP_N_STARTS] = {{
     .n_variables = HSEP_N_VARIABLES,
     .starts = hsep_starts,
     .guid = HSEP_GUID,
-    .angular = {int(table.is_angular)}{_EMBEDDED if weights else ""}}};
+    .angular = {int(table.is_angular)}{embedded}}};
 """
     return _header(table.kind, table.name, text)
 
@@ -188,9 +191,6 @@ static const hsep_variable hsep_variables[{len(rows)}] = {{
 {lines}
 }};
 """
-
-
-_EMBEDDED = ",\n    .weights = hsep_embedded_weights,\n    .weights_size = sizeof hsep_embedded_weights"
 
 
 def c_bytes(name: str, content: bytes) -> str:

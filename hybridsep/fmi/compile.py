@@ -62,18 +62,11 @@ TARGETS: Mapping[str, _Target] = {
 """All platforms; the two Macs share a universal file."""
 
 ALL_TARGETS = tuple(TARGETS)
-_MACS = ("x86_64-darwin", "aarch64-darwin")
 
-_FMI2_PLATFORMS: Mapping[str, tuple[str, ...]] = {
-    "linux64": ("x86_64-linux",),
-    "win64": ("x86_64-windows",),
-    "win32": ("x86-windows",),
-    "darwin64": _MACS,
-}
-"""FMI 2.0's names of platforms, which users know."""
+_FOLDERS = {one.folder: tuple(key for key in TARGETS if TARGETS[key].folder == one.folder) for one in TARGETS.values()}
+"""Platforms by their folder, FMI 2.0's name of them, which users know."""
 
-TARGET_NAMES = ("host", "all", *TARGETS, *_FMI2_PLATFORMS)  # allowed targets
-
+TARGET_NAMES = ("host", "all", *dict.fromkeys((*TARGETS, *_FOLDERS)))  # allowed targets
 
 Library = tuple[str, str]  # a kind and a platform, a key of :data:`TARGETS`
 Compiler = tuple[tuple[str, ...], str]  # its command, and a key that differs where its libraries may differ
@@ -92,7 +85,7 @@ def expanded(targets: Sequence[str]) -> tuple[str, ...]:
     """Return the platforms, keys of :data:`TARGETS`, of some of :data:`TARGET_NAMES`; FmuError if a name is unknown."""
     if unknown := sorted(set(targets) - set(TARGET_NAMES)):
         raise FmuError(f"no target {', '.join(unknown)}; there are {', '.join(TARGET_NAMES)}")
-    several = {**_FMI2_PLATFORMS, "all": ALL_TARGETS}
+    several = {**_FOLDERS, "all": ALL_TARGETS}
     keys = (key for target in targets for key in several.get(target, (target,)))
     return tuple(dict.fromkeys(host_target() if key == "host" else key for key in keys))
 
@@ -144,24 +137,20 @@ def _compiled(folder: Path, library: Library, compiler: Sequence[str]) -> bytes:
     return (folder / output).read_bytes()
 
 
-_UNIVERSAL = 0xCAFEBABE
-_ALIGNMENT = 14  # 16 KiB, the page of Apple's ARM processors; x86 has 4 KiB
-
-
 def universal(libraries: Sequence[bytes]) -> bytes:
     """Return the universal file of 64-bit Mach-O libraries, one for each processor."""
-    page = 1 << _ALIGNMENT
-    header = struct.pack(">2I", _UNIVERSAL, len(libraries))
+    alignment = 14  # 16 KiB, the page of Apple's ARM processors; x86 has 4 KiB
+    page = 1 << alignment
+    header = struct.pack(">2I", 0xCAFEBABE, len(libraries))
     body = b""
     for library in libraries:
         _, cpu, subtype = struct.unpack_from("<3I", library)
-        header += struct.pack(">5I", cpu, subtype, page + len(body), len(library), _ALIGNMENT)
+        header += struct.pack(">5I", cpu, subtype, page + len(body), len(library), alignment)
         body += library.ljust(-(-len(library) // page) * page, b"\0")
     return header.ljust(page, b"\0") + body
 
 
 _SHIPPED = Path(__file__).resolve().parents[1] / "_data" / "binaries"
-_KEPT_VERSIONS = 4  # versions of the sources whose libraries are kept in a checkout: a few branches, at 8 MB each
 
 
 def libraries(kind: str, targets: Sequence[str]) -> dict[str, bytes]:
@@ -280,5 +269,5 @@ def _cache() -> Path:
 
 def _forget_old_versions() -> None:
     versions = sorted(_cache().iterdir(), key=lambda folder: folder.stat().st_mtime, reverse=True)
-    for folder in versions[_KEPT_VERSIONS:]:
+    for folder in versions[4:]:  # a few branches of a checkout keep theirs, at 8 MB each
         shutil.rmtree(folder, ignore_errors=True)

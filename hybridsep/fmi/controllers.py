@@ -26,14 +26,12 @@ from .weights import WEIGHTS_FILE
 
 COMPONENTS = {"SepCompensator": "hsep", "HybridPredictor": "hsep_predictor"}  # name of the component of each model
 
-_NAME_MAX = 47 - len("..look-ahead")  # letters of component and axis together: HAL's 47, less the longest pin's
-
 
 def check_names(model: str, names: Sequence[str]) -> None:
     """Raise ParameterError if the names of a component's axes are too long for HAL, or one is there twice."""
     if len(set(names)) < len(names):
         raise ParameterError(f"each axis must have a name of its own, got {', '.join(names)}")
-    most = _NAME_MAX - len(COMPONENTS[model])
+    most = 47 - len(f"{COMPONENTS[model]}..look-ahead")  # HAL's 47 letters, less those of component and longest pin
     for name in names:
         if len(name) > most:
             raise ParameterError(
@@ -65,18 +63,16 @@ def axis_files(machine: Machine, model: str, weights: bytes | None = None) -> di
     return {TABLE_FILE: table_file(table, content_guid(files, table)), **files}
 
 
-_PARTS = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
-
-
 def axis_header(machine: Machine, model: str, weights: bytes | None = None) -> str:
     """Return the header's text, with a weights file; MachineError if a compensator has no limits of its drive."""
     compensates = model == "SepCompensator"
     if compensates:
         machine.check_section("drive_limits", ", or write a predictor's (--predictor)")
     numbers = machine.fmi_compensator_parameters() if compensates else machine.fmi_parameters()
+    parts = {"predictor": PREDICTOR_SETTINGS, "averaging": AVERAGING_SETTINGS, "compensator": COMPENSATOR_SETTINGS}
     settings = [
         f"    parameters->{part}.{name} = {numbers[name] + 0!r};"  # truth values are numbers there
-        for part, names in _PARTS.items()
+        for part, names in parts.items()
         for name in names
         if name in numbers
     ]

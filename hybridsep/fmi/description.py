@@ -27,8 +27,6 @@ _WHOLE = ("Integer", "Int32", "UInt64", "Enumeration")  # kinds whose numbers ar
 
 _TIME = Variable("time", "Real", "independent", "continuous", "simulation time", unit="s")
 
-_OWN_STEPS = ("FeedDrive",)  # models whose internal steps divide the communication step; all others sample at T_s
-
 
 def described_variables(table: FmuTable, fmi: str) -> list[tuple[Variable, int | None]]:
     """Return the variables by their value references, each with the length of its array, None if it is scalar.
@@ -83,7 +81,7 @@ def model_description(spec: FmuSpec, guid: str, generation_tool: str) -> bytes:
             simulation.set("canHandleVariableCommunicationStepSize", "false")
         if native:
             ET.SubElement(ET.SubElement(simulation, "SourceFiles"), "File", name="all.c")
-    if fmi3 and model not in _OWN_STEPS:
+    if fmi3 and model != "FeedDrive":  # whose steps divide the communication step; all others sample at T_s
         simulation.set("fixedInternalStepSize", _text(spec.machine.T_s))
     used = {variable.unit for variable in table}
     units[:] = [unit for unit in unit_elements() if unit.get("name") in used]
@@ -212,9 +210,6 @@ def terminals_and_icons(model: str) -> bytes:
 
 # Pages ----------------------------------------------------------------------------------------------------------------
 
-_PLAIN_NAMES = {"2": "-DFMI2_FUNCTION_PREFIX=", "3": "-DFMI3_OVERRIDE_FUNCTION_PREFIX"}
-"""Option with which the standard's headers give the FMI functions their plain names, by the version of FMI."""
-
 _SOURCES = {
     "ReferenceTrajectory": (
         "C.-H. Chou, M. Duan, C. E. Okwudire: A linear hybrid model for enhanced servo error pre-compensation of feed "
@@ -284,7 +279,9 @@ def _section(template: str, **values: object) -> str:
 
 def compile_note(name: str, fmi: str) -> str:
     """Return the section on compiling the sources of an FMU with a model identifier, HTML."""
-    return _section("compile", name=name, version=f"{fmi}.0", plain=_PLAIN_NAMES[fmi])
+    # with which the standard's headers give the FMI functions their plain names
+    plain = {"2": "-DFMI2_FUNCTION_PREFIX=", "3": "-DFMI3_OVERRIDE_FUNCTION_PREFIX"}[fmi]
+    return _section("compile", name=name, version=f"{fmi}.0", plain=plain)
 
 
 def _rows(group: list[tuple[str, str, str, str, str, str]]) -> str:

@@ -24,8 +24,6 @@ from .reference import reference_run
 from .spec import FmuSpec, content_guid
 from .weights import WEIGHTS_FILE
 
-_TRAJECTORY_MAGIC = b"HSEPTRJ1"
-
 
 def files(
     spec: FmuSpec, *, targets: Sequence[str] | None = None, embed_weights: bool = False, reference: bool = True
@@ -47,7 +45,7 @@ def files(
         # NumPy's sine differs by 0.1 fm from one version or processor to another: rounded to 10 pm, archives are alike
         played = [staircase(T_s), *(axis.round(11) for axis in spiral(T_s))]
         for n, x_d in enumerate(played if spec.samples is None else [*played, spec.samples]):
-            binary = _TRAJECTORY_MAGIC + struct.pack("<Qd", len(x_d), T_s) + x_d.astype("<f8").tobytes()
+            binary = b"HSEPTRJ1" + struct.pack("<Qd", len(x_d), T_s) + x_d.astype("<f8").tobytes()
             content[f"resources/trajectory_{n}.bin"] = binary
     if spec.weights is not None:
         content[f"resources/{WEIGHTS_FILE}"] = spec.weights

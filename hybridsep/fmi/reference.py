@@ -7,7 +7,7 @@ compare them with the FMU's.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -33,8 +33,6 @@ _SAMPLES_MAX = 3000
 _WINDOW_MAX = 1000  # longest look-ahead with a reference, samples: with a longer one no short run contains a prediction
 _RESOLUTION = 9  # decimals of an input, m; the result is computed from the rounded values
 _RESULT_RESOLUTION = 11  # decimals of a result that platforms agree on: an archive has the same bytes wherever built
-_REL_TOL = 1e-4
-_GAIN, _NOISE_STD = 1.02, 5e-6
 
 
 def reference_run(spec: FmuSpec) -> dict[str, bytes]:
@@ -49,7 +47,7 @@ def reference_run(spec: FmuSpec) -> dict[str, bytes]:
     outputs = [(name, variable.kind) for name, variable in table.named("output").items()]
     inputs = [(name, one.kind) for name, one in table.named("input").items() if one.wired]
     base = f"{REFERENCE_FOLDER}/{table.name}"
-    options = {"StartTime": 0.0, "StopTime": (len(rows) - 1) * T_s, "StepSize": T_s, "RelTol": _REL_TOL}
+    options = {"StartTime": 0.0, "StopTime": (len(rows) - 1) * T_s, "StepSize": T_s, "RelTol": 1e-4}
     files = {
         f"{base}_ref.csv": _csv(T_s, outputs, (row for row, _ in rows), _RESULT_RESOLUTION),
         f"{base}_ref.opt": "".join(f"{name}, {number!r}\n" for name, number in options.items()).encode(),
@@ -92,7 +90,7 @@ def _drive_rows(spec: FmuSpec) -> Rows:
 def _look_ahead_rows(spec: FmuSpec) -> Rows:
     """Return the rows of a look-ahead under the staircase, through two windows of prediction.
 
-    What a command leads to, of a compensator the modified one, is measured at a linear drive.
+    What a command leads to, of a compensator the modified one, is measured at the physics model, 2 % off.
     """
     machine, parameters, names = spec.machine, spec.table.parameters, list(spec.table.named("output"))
     settings = PredictorSettings.from_fmi(parameters)
@@ -105,20 +103,14 @@ def _look_ahead_rows(spec: FmuSpec) -> Rows:
     look_ahead = LookAhead(model, spec.table.rest, unit=machine.unit)
     warm_up = max(samples_before(settings.warm_up, machine.T_s), int(parameters.get("preview", 0)))
     n = min(max(_COMPENSATED_SAMPLES if compensates else _SAMPLES, 3 * settings.Np + warm_up), _SAMPLES_MAX)
-    measure, on_the_way = _linear_drive(machine), deque([0.0] * settings.n_late)
-    rows = Rows()
+    drive = machine.model.discretise(machine.T_s, machine.physics.input_hold).stepper()
+    encoder, on_the_way, rows = Encoder(5e-6, 0), deque([0.0] * settings.n_late), Rows()
     for x_d in _command(machine, n):
         outputs = [float(getattr(look_ahead, name)) for name in names]
-        on_the_way.append(round(measure(look_ahead.x_dm), _RESOLUTION))
+        on_the_way.append(round(encoder.measure(1.02 * drive(look_ahead.x_dm)), _RESOLUTION))
         rows.append((outputs, [x_d, on_the_way.popleft()]))
         look_ahead.sample(*rows[-1][1])
     return rows
-
-
-def _linear_drive(machine: Machine) -> Callable[[float], float]:
-    """Return a function of ``x_d(k)`` that gives the measured ``x(k)`` of the physics model 2 % off."""
-    drive, encoder = machine.model.discretise(machine.T_s, machine.physics.input_hold).stepper(), Encoder(_NOISE_STD, 0)
-    return lambda x_d: encoder.measure(_GAIN * drive(x_d))
 
 
 def _csv(T_s: float, columns: Iterable[tuple[str, str]], rows: Iterable[Iterable[float]], decimals: int) -> bytes:

@@ -30,8 +30,6 @@ _TITLES = {
     "ReferenceTrajectory": "Source of commands: plays the paper's staircase and spirals, or given samples",
 }
 
-_SUFFIX = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}
-
 
 @dataclass(frozen=True, eq=False)
 class FmuSpec:
@@ -125,7 +123,8 @@ def fmu_name(model: str, machine: str, flavour: str = FLAVOURS[0], fmi: str = FM
         raise FmuError(f"the version of FMI must be one of {', '.join(FMI_VERSIONS)}, got {fmi!r}")
     if flavour == "python" and fmi != "2":
         raise FmuError(f"FMUs of the Python flavour are of FMI 2 alone, as pythonfmu's are, got FMI {fmi}")
-    return f"{model}{_SUFFIX[flavour, fmi]}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
+    suffix = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}[flavour, fmi]
+    return f"{model}{suffix}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
 
 
 def table_of(
