@@ -16,8 +16,6 @@ from .source import ArraysSource, past_midnights
 from .text import with_own_names
 from .units import TIME_UNITS
 
-_OWN = (TypeError, AttributeError, LookupError)  # errors whose messages tell of the library's own names
-
 
 @contextmanager
 def _reading(path: Path, format_: str, what: str = "") -> Iterator[None]:
@@ -31,7 +29,8 @@ def _reading(path: Path, format_: str, what: str = "") -> Iterator[None]:
         raise
     except Exception as error:
         name = type(error).__name__
-        why = name if isinstance(error, _OWN) else first_line(f"{name}: {error}")
+        is_own = isinstance(error, TypeError | AttributeError | LookupError)  # whose messages tell of its own names
+        why = name if is_own else first_line(f"{name}: {error}")
         subject = f"{what} is" if what else "is"
         raise LogError(f"{path}: {subject} truncated, damaged or not {format_}: {why}") from error
 

@@ -46,10 +46,7 @@ _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 
 _START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
 _COUNTS, _IN_A_SAMPLE, _WHOLE = 2**16, 0.1, 1e-2  # of a counter: range, motion in a sample relative to it, rounding
-_SLOW = 0.1  # sampling interval, s, from which it is noted: milliseconds may have been given as seconds
 _LATE = 0.1  # lag, s, from which it is noted: the look-ahead of a controller of which nothing is known
-
-_ALONE, _SIZE = 10.0, 0.02  # size of an outlier in the usual steps, and relative to the travel, to be noted
 
 _USUAL = 0.98  # quantile of what is usual, beyond which are the samples that are looked for
 
@@ -233,13 +230,10 @@ def _lagged(u: Array, lags: Indices, known: NDArray[np.bool_]) -> Array:
 
 
 def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Finding]:
-    """Find columns that mean something else: exchanged, a flipped sign, another unit, no position, another axis.
-
-    ``x_d`` and ``x``, ``(n,)``, are the liveliest samples, NaN where missing, and ``given`` how x follows x_d there.
-    """
+    """Find columns that mean something else: exchanged, a flipped sign, another unit, no position, another axis."""
     known = np.isfinite(x)
     evidence, gains = given._asdict(), (given.gain, given.gain_at_one)
-    filled = np.interp(np.arange(len(x)), np.flatnonzero(known), x[known])
+    filled = np.interp(np.arange(len(x)), np.flatnonzero(known), x[known])  # where it is missing
     exchanged = following(filled, np.where(known, x_d, np.nan))
     noise = noise_std(x_d) / _travel(x_d), noise_std(filled) / _travel(x)
     better = _BETTER if noise[0] > _NOISIER * noise[1] else _BETTER_SWAPPED
@@ -285,10 +279,7 @@ _MEANINGS = {
 
 
 def _other_meaning(x_d: Array, x: Array, filled: Array, given: _Following) -> str:
-    """Return the reading of two columns, ``(n,)``, that explains them far better than the given one; empty without any.
-
-    ``filled`` is ``x`` interpolated where it is missing.
-    """
+    """Return the reading of two columns, ``(n,)``, that explains them far better than the given one; empty without."""
     variance, errors = float(np.nanvar(x)), [1.0]
     for position in (x_d - x, x_d + x):
         one = following(x_d, position)
@@ -388,7 +379,7 @@ def _note_rate(log: Log) -> Iterator[Finding]:
         )
         options = (("--resample", "at even times, linearly between samples"),)
         yield Finding("rate", words, {"n": float(len(where)), "largest": largest}, options=options)
-    if log.T_s > _SLOW:
+    if log.T_s > 0.1:
         yield Finding("slow samples", f"samples are {log.T_s:.3g} s apart: were ms given as s?", {"T_s": log.T_s})
 
 
@@ -435,11 +426,11 @@ def _note_outliers(log: Log) -> Iterator[Finding]:
 
 
 def _spikes(x: Array, travel: float) -> tuple[Indices, Array]:
-    """Return the samples that leave a signal, (n,), and by how much; it comes back, but at its ends."""
+    """Return the samples that leave a signal, (n,), by far, and by how much; it comes back, but at its ends."""
     steps = np.diff(np.pad(x, 1, mode="reflect"))
     heights = np.where(steps[:-1] * steps[1:] < 0.0, np.minimum(np.abs(steps[:-1]), np.abs(steps[1:])), 0.0)
     usual = float(np.nanquantile(np.abs(steps), _USUAL))
-    wrong = np.flatnonzero(heights > max(_ALONE * usual, _SIZE * travel))
+    wrong = np.flatnonzero(heights > max(10.0 * usual, 0.02 * travel))
     return wrong, heights[wrong]
 
 

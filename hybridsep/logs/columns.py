@@ -23,8 +23,6 @@ _COUNTS = (
 
 _OTHERS = re.compile(r"/|rpm|min-1|hz|%", re.IGNORECASE)  # in units of what is no position; another one may be given
 
-_ROW_LABELS = ("", "index", "__index_level_0__", "Unnamed: 0")  # names that pandas and Arrow give an index in a file
-
 _DATA = re.compile(r"(\.(data|values?|signals))+$", re.IGNORECASE)  # names of what MATLAB has beside a signal's time
 _GAP = 1.5  # intervals of the slower column between two samples of the faster one from which on the latter has a gap
 _SAME = 1e-6  # largest difference of two channels' times, in intervals, at which they are the same: rounding
@@ -184,8 +182,8 @@ def _steps(source: Source, name: str) -> Array:
 
 
 def _row_labels(source: Source) -> str | None:
-    """Return the column that counts rows, as pandas writes its index; None without one."""
-    for name in filter(source.names.__contains__, _ROW_LABELS):
+    """Return the column that counts rows, as pandas and Arrow write an index; None without one."""
+    for name in filter(source.names.__contains__, ("", "index", "__index_level_0__", "Unnamed: 0")):
         steps = _steps(source, name)
         if len(steps) >= COUNTED and (steps >= 1.0).all() and np.median(steps) == 1.0:
             return name

@@ -30,10 +30,6 @@ READERS: tuple[type[Source], ...] = (
 )
 """Readers by precedence; text, which has no mark of its own, is last."""
 
-_HEAD = 4096
-
-_TEXT = (".csv", ".txt", ".log")  # ends of the names of texts, in which no reader but theirs can say what is damaged
-
 _SAVE = "save its columns t, x_d and x as CSV"
 _PANDAS = "import pandas; pandas.read_{}('{{path}}').to_csv('log.csv', index=False)"
 _HDF5 = """these three lines convert it:
@@ -75,7 +71,7 @@ def open_source(path: Path) -> Source:
         if not path.is_file():
             raise LogError(f"{path}: there is no such file" if not path.exists() else f"{path}: is not a file")
         with path.open("rb") as file:
-            head = file.read(_HEAD)
+            head = file.read(4096)
         if not head:
             raise LogError(f"{path}: the file is empty")
         return _reader(path, head)(path)
@@ -94,7 +90,7 @@ def _reader(path: Path, head: bytes) -> type[Source]:
         return READERS[-1]
     named = [reader for reader in READERS[:-1] if path.name.lower().endswith(reader.endings)]
     known = ", ".join(dict.fromkeys(reader.format for reader in READERS))
-    if named and path.name.lower().endswith(_TEXT):
+    if named and path.name.lower().endswith((".csv", ".txt", ".log")):  # of which no other reader says what is damaged
         raise LogError(
             f"{path}: is binary, though its name says text: none of the formats that are read ({known}); {_SAVE}"
         )

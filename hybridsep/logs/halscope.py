@@ -12,8 +12,7 @@ from ..base.errors import LogError
 from .source import Block
 from .text import TextSource, split, with_own_names
 
-_PERIOD = re.compile(rb"#\s*Sampling period is\s+(-?\d{1,18})\s+ns\s")
-"""First line."""
+_PERIOD = re.compile(rb"#\s*Sampling period is\s+(-?\d{1,18})\s+ns\s")  # first line
 
 _TIME = "t"  # name of the time column, which is made from the period
 

@@ -27,8 +27,6 @@ from .source import Block, Source
 from .times import NOT_LATER, Times, recorded_times
 from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated_unit
 
-_OWN_NAMES = ("x_d", "x", "x_meas")  # names of columns of positions that leave no doubt
-
 
 class Table(Protocol):
     """Table of named columns, as pandas' and polars' DataFrame."""
@@ -248,7 +246,7 @@ def _check_alternation(path: Path, t: Array, x_d: Array) -> None:
 
 def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, str]) -> Iterator[str]:
     """Yield a remark if a column of positions was recognised by a name other than the library's own."""
-    known = {*_OWN_NAMES, *(name for pair in source.axes.values() for name in pair)}
+    known = {"x_d", "x", "x_meas", *(name for pair in source.axes.values() for name in pair)}
     roles = [role for role in ("x_d", "x") if role not in given]
     if any(stated_unit(columns[role].name)[0] not in known for role in roles):
         x_d, x = brief(columns["x_d"].name), brief(columns["x"].name)
@@ -290,9 +288,6 @@ def check_reading(unit: str | None, T_s: float | None) -> float | None:
 
 _TURN = 2 * math.pi
 
-_JUMP = 3.0  # largest difference of a jump from a whole turn, in the largest steps that are no jumps
-_WITHIN = 1.05  # largest range, in turns, of a position modulo one turn with its noise
-
 _ONE_PHASE, _CHANGES = 0.95, 50
 """Share of a slow sensor's changes that come in one sample of every n, which no other log of a hundred reached for any
 n, and fewest changes that show it."""
@@ -330,12 +325,12 @@ def _turn_jumps(x: Array) -> Indices:
     """Return the samples at which a position, NaN where it is missing, is one turn away from where it was before."""
     known = np.flatnonzero(np.isfinite(x))
     steps = np.diff(x[known])
-    if len(known) < 2 or np.ptp(x[known]) > _WITHIN * _TURN:
+    if len(known) < 2 or np.ptp(x[known]) > 1.05 * _TURN:  # with its noise
         return np.empty(0, dtype=np.intp)
     far = np.abs(steps) > _TURN / 2
     usual = float(np.abs(steps[~far]).max(initial=0.0))
     off = np.abs(np.abs(steps) - _TURN)
-    return np.asarray(known[1:][far & (off <= _JUMP * usual) & (off < _TURN / 2)])
+    return np.asarray(known[1:][far & (off <= 3.0 * usual) & (off < _TURN / 2)])
 
 
 def _error(x_d: Array, x_meas: Array) -> float:

@@ -21,16 +21,12 @@ from ..base.signals import Array
 from .names import SIGNALS, axes_of
 from .source import ArraysSource
 
-_ROOT = b"<traceSession"
-
 _ADDRESS = re.compile(r"(?:.*/)?(?P<name>[^/\[\]]+?)\s*(?:\[\s*(?:[a-z]\d*\s*,\s*)?(?P<axis>\w+)\s*\])?\s*")
 """``/Nck/!SD/nckServoDataCmdPos2ndEnc64 [u1, 7]``: a variable of axis 7."""
 
 _COMMANDED = re.compile(r"cmdpos|despos", re.IGNORECASE)
 _MEASURED = (re.compile(r"actpos", re.IGNORECASE), re.compile(r"measpos", re.IGNORECASE))
 """Names of the signals of positions, the measured ones by precedence."""
-
-_NOT_A_NUMBER = 9.2188684e18  # values above are the bits of a NaN, written as a whole number: there is none
 
 
 @dataclass
@@ -67,7 +63,8 @@ def _signals_of(path: Path) -> tuple[list[_Signal], float]:
                 raise ValueError(f"time {t:.9g} s after {last:.9g} s")
             last = t
             for key in record.keys() & signals.keys():
-                if (value := float(record.attrib[key])) <= _NOT_A_NUMBER:
+                # Values above are the bits of a NaN, written as a whole number: there is none
+                if (value := float(record.attrib[key])) <= 9.2188684e18:
                     signals[key].t.append(t)
                     signals[key].values.append(value)
     except (LookupError, ValueError, OverflowError) as error:
@@ -114,7 +111,7 @@ class SinumerikSource(ArraysSource):
     @staticmethod
     def recognises(head: bytes) -> bool:
         """Return whether it is XML with a trace session near its beginning."""
-        return head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<") and _ROOT in head
+        return head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<") and b"<traceSession" in head
 
     def column(self, name: str) -> Array:
         """Return the times of a clock, or a signal's values, each held until the next one."""
@@ -141,12 +138,8 @@ class SinumerikSource(ArraysSource):
         return found
 
 
-_SIGNALS = b'"SignalListHFData"'  # in the header of Capture's JSON
 _COUNTER = "CYCLE"
 _TIME = "t"  # name of the time column, which is made from the counter of cycles
-
-_ROTARY = ("A", "B", "C", "SP", "S")
-"""Beginnings of the names of rotary axes and spindles, whose positions are in degrees; others are in millimetres."""
 
 
 class CaptureSource(ArraysSource):
@@ -186,7 +179,7 @@ class CaptureSource(ArraysSource):
         moving = [axis for axis, (x_d, _) in self.axes.items() if np.ptp(self._columns[x_d]) != 0.0]
         self.axis = moving[0] if moving else ""
         self.assumed_units = {
-            name: "deg" if axis.upper().startswith(_ROTARY) else "mm"
+            name: "deg" if axis.upper().startswith(("A", "B", "C", "S")) else "mm"  # of rotary axes and spindles
             for name, axis in axes.items()
             if name.split("|")[0] in ("ENC_POS", *SIGNALS.values())
         }
@@ -195,7 +188,7 @@ class CaptureSource(ArraysSource):
     @staticmethod
     def recognises(head: bytes) -> bool:
         """Return whether it is a JSON object with the list of signals near its beginning."""
-        return head.lstrip().startswith(b"{") and _SIGNALS in head
+        return head.lstrip().startswith(b"{") and b'"SignalListHFData"' in head
 
     def column(self, name: str) -> Array:
         """Return a signal."""

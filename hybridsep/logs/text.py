@@ -29,11 +29,9 @@ from .source import Block, Source, past_midnights
 from .units import plain_name, position_unit, time_unit
 
 _HEAD_LINES = 1000  # lines, blank ones aside, in which names and numbers must begin
-_PREAMBLE = 3  # fewer rows of numbers are a preamble's, where there are more
 _BLOCK = 10_000  # lines that are converted at once
 
-_COMMENTS = ("#", "%", "//", "!")
-"""Beginnings of a comment line."""
+_COMMENTS = ("#", "%", "//", "!")  # beginnings of a comment line
 
 _DELIMITERS = (";", "\t", ",", None)  # delimiters by precedence; None is blanks
 _UNIT_ROWS = ("unit", "units", "einheit", "einheiten", "y_unit_label")  # first cells of rows of units
@@ -374,7 +372,7 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
         edges = [i for i, (before, now) in enumerate(pairwise([0, *widths, 0])) if now != before]
         for width in {*widths} - {0}:
             runs = [run for run in pairwise(edges) if widths[run[0]] == width]
-            runs.sort(key=lambda run: run[1] - run[0] < _PREAMBLE)
+            runs.sort(key=lambda run: run[1] - run[0] < 3)  # fewer rows are a preamble's, where there are more
             found = (_with_names(rows, *run, delimiter) for run in runs)
             if (table := next(filter(None, found), None)) is not None:
                 n = max(end - start for start, end in runs if rows[start][0] >= table.first)

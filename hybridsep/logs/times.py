@@ -19,7 +19,6 @@ _PLAUSIBLE = (2e-6, 0.5)  # intervals, s, of a log of an axis; beyond, a unit of
 COUNTED = 10  # fewest times whose unit is doubted: two or three seconds are no index yet
 
 NOT_LATER = 0.05  # share of times not above the one before from which they are too coarse to tell an interval or a gap
-_RESOLVED = 0.2  # largest resolution of times of single precision, in intervals, with which they tell a gap
 
 _GAP, _LATE, _AROUND = 1.5, 0.6, 9
 """Interval, in sampling intervals, from which samples are missing, or by which, less one, a clock was set back; how
@@ -32,8 +31,6 @@ through the neighbours missed ten rows by 0.4 to 6 % of what a line does, one by
 _WHOLE, _JITTER, _WHOLE_MAX = 0.05, 4.0, 0.35
 """Difference, in intervals, of a gap from whole rows with which the times tell how many are lost: of even times, by how
 many times their usual jitter it is larger, and its most."""
-
-_TOLERANCE = 0.01  # largest relative difference of a given interval from that of the times: more than a clock's drift
 
 _ROUNDING, _ERRORS, _ROUNDING_MAX = 1e-8, 3.0, 1e-4
 """Relative change by which an interval may be rounded at least, in standard errors, and at most."""
@@ -61,9 +58,9 @@ def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated
     LogError if the times never increase, their unit is unknown, they are too coarse, or another interval was given.
     """
     single = times.astype(np.float32)
-    # Numbers of single precision that do not resolve the interval
+    # Numbers of single precision that do not resolve the interval to a fifth, and so tell no gap
     coarse = np.array_equal(single, times) and (
-        float(np.spacing(np.abs(single).max())) > _RESOLVED * abs(float(times[-1] - times[0])) / (len(times) - 1)
+        float(np.spacing(np.abs(single).max())) > 0.2 * abs(float(times[-1] - times[0])) / (len(times) - 1)
     )
     t, remarks = _unwrapped(times * factor)
     steps = np.diff(t)
@@ -92,7 +89,8 @@ def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated
         )
     gaps, lost = _gaps(t, interval)
     starts = gaps[lost[gaps] == 0]
-    words = (*_words(t, np.flatnonzero(lost), T_s, _PUT_BACK, lost[lost > 0]), *_words(t, starts, T_s))
+    put_back = "the command is the cubic through its neighbours there, the measurement missing"
+    words = (*_words(t, np.flatnonzero(lost), T_s, put_back, lost[lost > 0]), *_words(t, starts, T_s))
     return Times(t, T_s, (0, *starts.tolist()), (*remarks, *words), lost if lost.any() else None)
 
 
@@ -152,10 +150,7 @@ def _unknown_unit(path: Path, name: str, first: float, interval: float, *, count
 
 
 def _is_one_of(ratio: float, *known: float) -> bool:
-    return any(abs(ratio / one - 1.0) <= _TOLERANCE for one in known)
-
-
-_PUT_BACK = "the command is the cubic through its neighbours there, the measurement missing"
+    return any(abs(ratio / one - 1.0) <= 0.01 for one in known)  # more than a clock drifts
 
 
 def _words(

@@ -18,7 +18,6 @@ from .source import ArraysSource
 from .text import decimal_points, is_number
 
 _BOM = b"\xef\xbb\xbf"
-_MARKS = (b"\t", b";", b",")
 _NAME, _UNIT, _SAMPLE_TIME, _START = "Name", "Unit", "SampleTime[ms]", "Starttime of export"
 
 _HEAD_LINES = 400  # lines in which the numbers must begin
@@ -67,7 +66,7 @@ class TwinCatSource(ArraysSource):
         first, _, rest = head.removeprefix(_BOM).partition(b"\n")
         mark = first[len(_NAME) : len(_NAME) + 1]
         begin = _NAME.encode() + mark
-        return first.startswith(begin) and mark in _MARKS and b"\n" + begin in b"\n" + rest
+        return first.startswith(begin) and mark in (b"\t", b";", b",") and b"\n" + begin in b"\n" + rest
 
     def _channels(self, first: tuple[int, list[str]]) -> dict[str, tuple[int, int]]:
         """Return the columns by name, times among them; set what is known of them."""
