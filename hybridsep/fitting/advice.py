@@ -190,10 +190,6 @@ def peers_in_words(judged: Judged) -> str:
     return "; ".join(words) + "."
 
 
-_ALL = 0.995  # share of a file's samples from which on it counts as used, all of it
-_RATE = 0.01  # relative difference from the file's own rate from which on both are said
-
-
 def extent(logs: Sequence[Log]) -> str:
     """Return how many samples logs of one sampling interval have, over what time and at what rate.
 
@@ -204,10 +200,10 @@ def extent(logs: Sequence[Log]) -> str:
     n_used = sum(int(np.count_nonzero(~np.isnan(log.x_meas))) for log in logs)
     n_recorded = sum(log.n_recorded or len(log.t) for log in logs)
     words = f"{n} samples"
-    if n_used < _ALL * n_recorded:
+    if n_used < 0.995 * n_recorded:  # else the file counts as used, all of it
         words = f"{n_used} of {n_recorded} samples ({100 * n_used / n_recorded:.3g} %)"
     words += f", {n * T_s:.4g} s at {1 / T_s:.4g} Hz"
-    if own and abs(T_s / own - 1.0) > _RATE:
+    if own and abs(T_s / own - 1.0) > 0.01:
         words += f" (recorded at {1 / own:.4g} Hz)"
     segments = sum(len(log.starts) for log in logs)
     if segments == len(logs):

@@ -49,7 +49,6 @@ _SCALE = 0.05
 be ten times as fast: then no stop operator is as short as a belt's friction before sliding, and a warm loop has 1.16
 times the error of a cold one instead of 0.97. Predictions alone are 2 % worse with it on recorded axes."""
 
-_CHANGED = ("acceleration", "jerk", "change_max")  # entries of ``[drive_limits]`` whose cost is said
 FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to say what it costs
 _GAIN = 0.05  # relative gain from which on a limit twice as large, or a longer look-ahead, is advised
 
@@ -60,12 +59,6 @@ _LIGHTER = 1e-3  # ``jerk_weight`` relative to the machine's with which plans th
 _LITTLE = 0.01  # share of the error without compensation below which errors are alike
 
 _EXPLAINED = 0.7  # share of the error that the physics model's compensation leaves, from which on it knows little
-_UNEXPLAINED = " The physics model explains little of the error, so this leaves out most of it, and may be far off."
-
-_HOW = (
-    "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the log is "
-    "added as it was recorded; that the residual changes with the command is left out."
-)
 
 
 def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
@@ -334,12 +327,18 @@ class Tracking:
                 " The log's own error is above it, so the compensator may trip at once: take what the zeros are apart "
                 "from the measurement or, where the axis sags, give both limits."
             )
+        how = (
+            "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the "
+            "log is added as it was recorded; that the residual changes with the command is left out."
+        )
+        if self.physics.rms > _EXPLAINED * self.none.rms:
+            how += " The physics model explains little of the error, so this leaves out most of it, and may be far off."
         return [
             *lines,
             *(self.costs.lines(shown) if self.costs is not None else ()),
             *(self.look_aheads.lines() if self.look_aheads is not None else ()),
             trips,
-            _HOW + (_UNEXPLAINED if self.physics.rms > _EXPLAINED * self.none.rms else ""),
+            how,
         ]
 
 
@@ -445,7 +444,7 @@ class Stretch:
             return max(error.rms, least) < (1.0 - _GAIN) * now.rms and error.largest <= now.largest
 
         now, wanted, effects, advised = error_of(own), own, {}, {}
-        for entry in _CHANGED[: 2 if own.change_max is None else 3]:
+        for entry in ("acceleration", "jerk", "change_max")[: 2 if own.change_max is None else 3]:
             name = DRIVE_LIMIT_ENTRIES[entry].name
             effects[name] = {one: now if one == 1.0 else error_of(_scaled(own, entry, one)) for one in FACTORS}
             if gains(effects[name][2.0]):

@@ -42,7 +42,6 @@ from .replay import Recording, beginnings, replay, split_log
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_LOOK_AHEAD = 0.1  # look-ahead, s, of a controller of which nothing is known
 _SHARE = 0.5  # share of each log's samples for training; the rest is held out for the test
 
 _TRIED_MAX = 20_000
@@ -317,7 +316,7 @@ def fit(
         if log.unit != logs[0].unit:
             raise ParameterError(f"{log.path.name} is in {log.unit}, {logs[0].path.name} in {logs[0].unit}")
     findings = {log.path.name: checked(log) for log in logs}
-    window = max(1, round(_LOOK_AHEAD / T_s)) if Np is None else Np
+    window = max(1, round(0.1 / T_s)) if Np is None else Np  # 0.1 s of a controller of which nothing is known
     pieces = [[(one.x_d, moved_by_command(one)) for one in log.segments()] for log in logs]
     recordings = [one for of_log in pieces for one in split_log(of_log, _SHARE, window)]
     judging = max(len(recording.x) - recording.n_train for recording in recordings)

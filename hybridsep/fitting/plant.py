@@ -29,11 +29,7 @@ from .replay import Recording
 
 _FITTED = 2 / 3  # share of the training samples that the fit takes; the others choose
 _WORTH = 0.9  # error relative to the identified model's alone from which a disturbance is kept
-_EVALUATIONS = 30  # most evaluations of a fit; the example log's needs 30, a third of a second
-_SETTLED = 0.01  # share of an initial motion that is left when samples begin to count
 _TRIED_MAX = 20_000  # most samples of the commands to try with: 20 s at 1 kHz, which a co-simulation takes seconds for
-_LEAD_IN = 100  # samples at rest before the commands to try with
-_AT_REST = 1e-3  # velocity at rest, relative to the largest
 
 _MODE_STEPS, _MODE_REACH = (0.1, 0.3, 0.05, 0.05), (1.0, 2.0, 1.0, 1.0)
 """Steps and bounds of a mode's changes: log f_n, log zeta, alpha/ω² and beta/ω."""
@@ -94,9 +90,9 @@ class _Piece:
         self.v_d = np.diff(self.u, prepend=0.0) / discrete.T_s
         self.path = discrete.forced_response(discrete.rest(), self.u)[0]
         n, n_train = np.arange(len(x_d)), recording.n_train
-        # The model has forgotten then how it began
+        # The model has forgotten then how it began, but for 1 % of its motion
         slowest = float(np.abs(np.linalg.eigvals(discrete.A)).max(initial=0.0))
-        settles = math.ceil(math.log(_SETTLED) / math.log(slowest)) if 0.0 < slowest < 1.0 else 0
+        settles = math.ceil(math.log(0.01) / math.log(slowest)) if 0.0 < slowest < 1.0 else 0
         known = ~np.isnan(x) & (n >= min(discrete.dead_time + settles, n_train // 4))
         self.fitted = known & (n < _FITTED * n_train)
         self.choosing = known & (n >= _FITTED * n_train) & (n < n_train)
@@ -151,9 +147,9 @@ def commands_to_try(recordings: Sequence[Recording]) -> Array:
     distances = [float(np.abs(np.diff(one.x_d)).sum()) for one in recordings]
     found = recordings[distances.index(max(distances))].x_d
     moving = np.flatnonzero(np.diff(found))
-    found = found[max(int(moving[0]) - _LEAD_IN, 0) if len(moving) else 0 :][:_TRIED_MAX]
+    found = found[max(int(moving[0]) - 100, 0) if len(moving) else 0 :][:_TRIED_MAX]  # with 100 samples of rest before
     steps = np.abs(np.diff(found))
-    at_rest = np.flatnonzero(steps <= _AT_REST * steps.max(initial=0.0)) + 1
+    at_rest = np.flatnonzero(steps <= 1e-3 * steps.max(initial=0.0)) + 1
     last = int(at_rest[-1]) + 1 if len(at_rest) else 0
     found = found[:last] if last > len(found) // 2 else found
     if not starts_in_motion(found):
@@ -200,7 +196,8 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
     bound = np.append(reach_of_modes, [1e3, 1e3, 0.0])
     least = np.append(-reach_of_modes, [0.0, 0.0, math.log(_SMALLEST_SPREAD)])
     steps = np.append(np.tile(_MODE_STEPS, n // 4), np.ones(3))
-    how: dict[str, Any] = {"bounds": (least, bound), "x_scale": steps, "max_nfev": _EVALUATIONS}
+    # The example log needs 30 evaluations, a third of a second
+    how: dict[str, Any] = {"bounds": (least, bound), "x_scale": steps, "max_nfev": 30}
     for with_stiffness in (False, True):
         start = np.append(np.zeros(n), [0.5, 0.5 if with_stiffness else 1e-9, math.log(0.02)])
         try:
