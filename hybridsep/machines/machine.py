@@ -32,9 +32,6 @@ if TYPE_CHECKING:  # they load slowly, and whoever builds an FMU needs none
     from ..logs.log import Log
     from ..predict.predictor import HybridPredictor
 
-
-_COLUMN = 32  # column of the comments, for alignment
-
 _NEEDED = {
     "plant": "which hybridsep fit writes from a log of the axis",
     "limits": "of its trajectory; add them",
@@ -366,7 +363,7 @@ def _lines(place: str, table: Mapping[str, Any], words: Mapping[str, str], headi
             tables += [line for item in value for line in _lines(inner, item, words, f"[[{inner}]]")]
         else:
             line, said = f"{name} = {_value(value)}", words.get(name, "")
-            own.append(f"{line:<{_COLUMN}}# {said}" if said and "\n" not in line else line)
+            own.append(f"{line:<32}# {said}" if said and "\n" not in line else line)
     return ["", heading, *own, *tables] if own and heading else [*own, *tables]
 
 

@@ -112,7 +112,7 @@ def _text_entry(allows: Callable[[Any], bool], what: str, default: Any = MISSING
     def read(value: Any, place: str, problems: list[str]) -> Any:
         if not allows(value):
             problems.append(f"{place} must be {what}, got {brief(value)}")
-        return value
+        return tuple(value) if isinstance(value, list) else value
 
     return _entry(read, default, **more)
 
@@ -126,16 +126,8 @@ def line_entry(default: Any = MISSING) -> Any:
     return _text_entry(_is_line, _LINE_WORDS, default)
 
 
-def lines_entry() -> Any:
-    """Declare an entry that is a list of lines, none by default."""
-
-    def read(value: Any, place: str, problems: list[str]) -> Any:
-        if not isinstance(value, list | tuple) or not value or not all(map(_is_line, value)):
-            problems.append(f"{place} must be a list, each entry {_LINE_WORDS}, got {brief(value)}")
-            return ()
-        return tuple(value)
-
-    return _entry(read, ())
+def _are_lines(value: Any) -> bool:
+    return isinstance(value, list | tuple) and bool(value) and all(map(_is_line, value))
 
 
 def choice_entry(*choices: str, default: Any = MISSING) -> Any:
@@ -274,11 +266,7 @@ class IdentifiedSection(Section):
 
 PlantSection = FeedDriveSection | StageSection | IdentifiedSection
 
-_PLANTS: Mapping[str, type[PlantSection]] = {
-    "feed_drive": FeedDriveSection,
-    "stage": StageSection,
-    "identified": IdentifiedSection,
-}
+_PLANTS = {"feed_drive": FeedDriveSection, "stage": StageSection, "identified": IdentifiedSection}
 
 
 def plant_entry() -> Any:
@@ -342,7 +330,7 @@ class FileSection(Section):
         "a letter, then at most 99 letters, digits and _",
     )
     title: str = line_entry()
-    sources: tuple[str, ...] = lines_entry()
+    sources: tuple[str, ...] = _text_entry(_are_lines, f"a list, each entry {_LINE_WORDS}", ())
     T_s: float = parameter_entry("T_s", PARAMETERS["T_s"].default)
     unit: str = choice_entry("m", "rad", default="m")
     physics: Physics = section_entry(Physics)
