@@ -145,10 +145,7 @@ def print_json(result: Any) -> None:
 
 
 def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
-    """Print what files hold: names, units, and what is read without a word.
-
-    LogError if a file cannot be read.
-    """
+    """Print what files hold: names, units, and what is read without a word; LogError if one cannot be read."""
     from ..logs.columns import channels
     from ..logs.formats import open_source
 

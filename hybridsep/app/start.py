@@ -7,8 +7,6 @@ import typer
 
 from . import options
 
-_LAG = 0.006  # time constant of the axis in a machine file to edit, s
-
 
 def demo(
     out: Annotated[Path, typer.Option(help="Folder for FMUs, figures, results and summary.json.")] = Path("demo"),
@@ -80,14 +78,15 @@ def init(
     from .console import check_outputs
 
     check_outputs([("OUT", out, (".toml",))], {}, force=force)
+    lag = 0.006  # time constant, s
     machine = machine_of(
-        *(ModalModel([lag_mode(_LAG)]), "zoh", 1e-3, machine_name(out), f"{out.stem}, by hybridsep init"),
+        *(ModalModel([lag_mode(lag)]), "zoh", 1e-3, machine_name(out), f"{out.stem}, by hybridsep init"),
         predictor={"Np": 100, "p": 50, "q": 3, "averaging": True},
     )
     comments = [
-        f"Physics model: a lag, tau = {_LAG:g}. hybridsep fit finds it from a log of the axis.",
+        f"Physics model: a lag, tau = {lag:g}. hybridsep fit finds it from a log of the axis.",
         f"Next: hybridsep backtest LOG --machine {out}",
     ]
     more = Path(__file__).with_name("more_sections.toml")  # which a machine file may have besides
     write_whole(out, machine_text(machine, comments, annotated=True) + more.read_text(encoding="utf-8"))
-    typer.echo(f"{out} written: a lag, tau = {_LAG:g}; edit it")
+    typer.echo(f"{out} written: a lag, tau = {lag:g}; edit it")

@@ -16,8 +16,6 @@ from .errors import FmuError, ParameterError
 _STEP_MAX = 100.0  # longest communication step, s, which bounds the cost of one: 10⁷ samples at the shortest ``T_s``
 
 _TOLERANCE = 0.05  # of T_s: the importer's times may be whole nanoseconds or in single precision
-_SPACINGS = 8.0  # ulp(t): a few roundings of the importer's arithmetic
-_SPLIT = 134217729.0  # 2^27 + 1, splits a double into two halves (Veltkamp 1968)
 
 
 class SampleClock(NamedTuple):
@@ -92,8 +90,8 @@ def check_communication_point(t: float, end: float, tolerance: float) -> None:
 
 
 def _resolution(t: float) -> float:
-    """Return the resolution of a time ``t``, s: a few spacings of doubles."""
-    return _SPACINGS * math.ulp(t)
+    """Return the resolution of a time ``t``, s: a few roundings of the importer's arithmetic."""
+    return 8.0 * math.ulp(t)
 
 
 def _add(since: float, carry: float, time: float) -> tuple[float, float]:
@@ -107,6 +105,6 @@ def _add(since: float, carry: float, time: float) -> tuple[float, float]:
 
 def _take(since: float, carry: float, n: int, T_s: float) -> tuple[float, float]:
     """Return ``since + carry − n·T_s``, by two products that are exact for ``n`` below 2²⁷."""
-    scaled = _SPLIT * T_s
+    scaled = 134217729.0 * T_s  # 2^27 + 1 splits a double into two halves (Veltkamp 1968)
     high = scaled - (scaled - T_s)
     return _add(*_add(since, carry, -n * high), -n * (T_s - high))

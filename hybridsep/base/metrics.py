@@ -182,15 +182,12 @@ class Move(NamedTuple):
     settling: float  # s from the end of the command until the error stays within the window; inf where it never does
 
 
-_REST = 10  # samples without a change of the command that end a move
-
-
 def moves_of(x_d: Array, x: Array, T_s: float, in_position: float) -> list[Move]:
     """Return the moves of a command and its measured positions, ``(n,)``, m, NaN where missing."""
     changes = np.flatnonzero(np.diff(x_d) != 0.0)
     if not len(changes):
         return []
-    ends = np.append(np.flatnonzero(np.diff(changes) > _REST), len(changes) - 1)
+    ends = np.append(np.flatnonzero(np.diff(changes) > 10), len(changes) - 1)  # as many samples of rest end a move
     firsts, lasts = changes[np.append(0, ends[:-1] + 1)], changes[ends] + 1
     error, found = np.abs(x_d - x), []
     for first, last, until in zip(firsts, lasts, np.append(firsts[1:], len(x_d)), strict=True):

@@ -36,9 +36,7 @@ class Settings:
     OPTIONAL: ClassVar[tuple[str, ...]] = ()  # fields that may be None
     LABEL: ClassVar[str] = ""  # name of a field in messages; its parameter's if it is empty
 
-    ELSEWHERE: ClassVar[tuple[str, ...]] = ()
-    """Fields that are no entries of these settings' own section of a machine file."""
-
+    ELSEWHERE: ClassVar[tuple[str, ...]] = ()  # fields that are no entries of its own section of a machine file
     PARTS: ClassVar[Mapping[str, type["Settings"]]] = {}  # fields that are settings themselves, or None
 
     def __init_subclass__(cls) -> None:
@@ -130,8 +128,7 @@ class PredictorSettings(Settings):
     AVERAGING: ClassVar[tuple[str, ...]] = ("averaging", "effect", "noise_std", "forgetting", "period", "recall")
     """Fields of the residual model with averaging."""
 
-    KNOWN: ClassVar[tuple[str, ...]] = ("period", "measurement_delay")
-    """Fields that are known of an axis, and not fitted to a log."""
+    KNOWN: ClassVar[tuple[str, ...]] = ("period", "measurement_delay")  # known of an axis, and not fitted to a log
 
     ELSEWHERE: ClassVar[tuple[str, ...]] = ("T_s", "input_hold")
 

@@ -23,7 +23,6 @@ PREDICTION_MAX = 1e100
 """Largest magnitude of a published prediction, m, beyond which the learned recursion counts as diverging: sums of
 squares of smaller values cannot overflow."""
 
-
 _SI = ("", "m", "meter", "metre", "rad", "radian", "dimensionless")  # units of a quantity that is taken as it is
 
 _GAP = 1.75  # usual steps of an index from which on samples are missing in it; 1.25 ms may be rounded to 2 ms

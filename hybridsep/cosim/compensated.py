@@ -15,8 +15,6 @@ from .inverse import FirInverse, PlayedCommand
 from .loop import cosimulate
 from .run import Run
 
-_TRAINING_SEED = 1000  # noise seed of the training run of a warm compensator; no case uses it
-
 COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
 """Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.figures.CASES`: value of ``compensate``."""
 
@@ -71,7 +69,8 @@ def train(machine: Machine, command: Array, path: Path) -> None:
     """Save what a machine's compensator learns in one run of the library over ``command``, ``(n,)``, m."""
     assert machine.plant is not None
     compensator = machine.new_compensator()
-    cosimulate(compensator, machine.new_plant(), command, encoder=Encoder(machine.plant.noise_std, _TRAINING_SEED))
+    encoder = Encoder(machine.plant.noise_std, 1000)  # a seed that no case uses
+    cosimulate(compensator, machine.new_plant(), command, encoder=encoder)
     compensator.predictor.save(path)
 
 

@@ -60,10 +60,9 @@ def contours_of(x: Mapping[str, Run], y: Mapping[str, Run], path: PlanarPath | N
 def _nearest(
     points: Points, path: Points, around: NDArray[np.int64], first: int, end: int
 ) -> tuple[NDArray[np.int64], Points, Array]:
-    """Return where a polyline is nearest to each point, among segments ``around + first … around + end − 1``.
+    """Return the segment of a polyline nearest to each point, the point on it, and the distance, positive on the left.
 
-    Returns ``segments``, ``nearest``, ``distance``, (n,): the segment, the point on it, and the distance, positive on
-    the left.
+    Segments are ``around + first … around + end − 1``; ``(n,)`` each.
     """
     along = np.diff(path, append=path[-1:])
     lengths = np.maximum(np.abs(along) ** 2, 1e-300)

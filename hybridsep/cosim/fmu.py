@@ -24,9 +24,6 @@ from fmpy.fmi1 import FMICallException
 from ..base.errors import FmuError, check_kind, first_line, listed
 from ..base.files import as_path, named_errors
 
-_WORDS_MAX = 1000  # most characters of an FMU's message in an error
-_NO_RUN_NEEDS = ("sources/", "documentation/")  # folders of an archive with most of its files
-
 _LOADING = threading.Lock()
 
 logging.getLogger("hybridsep.fmu").addHandler(logging.NullHandler())  # our FMUs' refusals are part of our errors
@@ -143,9 +140,10 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
     def _load(self, archive: Path, folder: Path, instance_name: str) -> None:
         identifier, version = self.description.coSimulation.modelIdentifier, self._version
         place = f"binaries/{version.platform}/{identifier}{fmpy.sharedLibraryExtension}"
+        unused = ("sources/", "documentation/")  # folders with most of an archive's files, which no run needs
         try:
             with named_errors(gettempdir()):
-                fmpy.extract(str(archive), folder, include=lambda name: not name.startswith(_NO_RUN_NEEDS))
+                fmpy.extract(str(archive), folder, include=lambda name: not name.startswith(unused))
             if not (folder / place).is_file():
                 there = sorted(path.name for path in (folder / "binaries").glob("*") if path.is_dir())
                 raise FmuError(f"{place} is missing, there are binaries for {listed(there, str)}")
@@ -326,7 +324,7 @@ class FmuInstance(AbstractContextManager["FmuInstance"]):
             return ""
         text = self.log[-1][1]
         framed = re.search(r"\w+Error\(([\"'])(.*)\1\)", text, re.DOTALL)
-        return f": {' '.join((framed[2] if framed else text).split())[:_WORDS_MAX]}"
+        return f": {' '.join((framed[2] if framed else text).split())[:1000]}"
 
 
 def _instantiate(slave: Any, version: _Version, log: list[tuple[int, str]]) -> None:

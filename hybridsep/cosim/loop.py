@@ -211,10 +211,7 @@ class LibraryController:
 
 
 class _OwnController:
-    """A compensator of the user's own; a run has NaN for the predictions that it does not make.
-
-    ParameterError if ``T_s`` or ``delay`` is out of range.
-    """
+    """A compensator of the user's own; a run has NaN for the predictions that it does not make."""
 
     name: str = "the compensator"
     kind: ControllerType = COMPENSATOR

@@ -184,18 +184,12 @@ class Run:
         return {one: metrics.batch_rms(self.x_meas - getattr(self, one), self.Np) for one in ("x_pb", "x_hold", "x_h")}
 
     def save(self, path: str | Path) -> None:
-        """Write the columns of the run's kind to ``path``: ``.csv`` with one row a sample, or ``.npz``.
-
-        ValueError if the suffix is another one.
-        """
+        """Write the columns of the run's kind, ``.csv`` or ``.npz``, as :func:`save_columns` does."""
         save_columns({name: getattr(self, name) for name in self.kind.columns}, path)
 
 
 def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
-    """Write arrays ``(n,)`` by name: ``.csv`` with one row a sample, truth values as 0 and 1, or ``.npz``.
-
-    ValueError if the suffix is another one.
-    """
+    """Write arrays ``(n,)`` by name: ``.csv``, one row each, truth values as 0 and 1, or ``.npz``; or ValueError."""
     path = as_path(path)
     suffix = path.suffix.lower()
     if suffix == ".npz":

@@ -36,8 +36,6 @@ PRINTED = {
 }
 """Printed figures of the paper for the demonstration's cases, RMS in µm against the measured position."""
 
-_PEERS = {"n_batches_worse_than_physics": "x_pb", "n_batches_worse_than_hold": "x_hold"}
-
 _PAIR = ("HybridPredictor", "FeedDrive")  # FMUs of a prediction
 
 SEEDS = 10  # noise seeds that a full demonstration's staircase is averaged over
@@ -102,9 +100,9 @@ def spiral_case(out: Path, advance: Advance) -> Summary:
 
 def _worse(run: Run) -> dict[str, Any]:
     """Return in how many windows the hybrid is worse than the physics model, and than hold, of how many."""
-    errors = run.batch_rms()
-    worse = {name: int(np.count_nonzero(errors["x_h"] > errors[peer])) for name, peer in _PEERS.items()}
-    return {"n_batches": len(errors["x_h"]), **worse}
+    errors, peers = run.batch_rms(), {"physics": "x_pb", "hold": "x_hold"}
+    worse = {name: int(np.count_nonzero(errors["x_h"] > errors[peer])) for name, peer in peers.items()}
+    return {"n_batches": len(errors["x_h"]), **{f"n_batches_worse_than_{name}": n for name, n in worse.items()}}
 
 
 def demo_files(out: str | Path, *, full: bool = False) -> list[Path]:

@@ -42,9 +42,6 @@ _SPANS = {
 """Shading of spans that a lesser model planned than others of the run."""
 
 
-_PAD = 0.08  # room between panels, and at the edges, inches
-
-
 def _legend(place: Axes | Figure, handles: Sequence[Any], **where: Any) -> None:
     """Give a panel or a figure a legend in one row, without a frame."""
     place.legend(handles=handles, ncols=max(len(handles), 1), columnspacing=1.4, frameon=False, **where)
@@ -69,7 +66,7 @@ def save_figure(figure: Figure, path: str | Path) -> None:
     FigureCanvasAgg(figure)
     engine = figure.get_layout_engine()
     if isinstance(engine, ConstrainedLayoutEngine):
-        engine.set(w_pad=_PAD, h_pad=_PAD)
+        engine.set(w_pad=0.08, h_pad=0.08)  # room between panels, and at the edges, inches
     kind = Path(path).suffix.lower().removeprefix(".")
     metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
     # pieces of a line, which may be of any length

@@ -16,10 +16,8 @@ from ..base.signals import Indices
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-PHYSICS, HOLD, HYBRID = "#d95f02", "#7f7f7f", "#1b6ca8"
-"""Colours of the predictions, in all figures."""
+PHYSICS, HOLD, HYBRID = "#d95f02", "#7f7f7f", "#1b6ca8"  # colours of the predictions, in all figures
 
-_COLUMNS = 600  # columns of a chart, each with its extremes; the widest has 900 pixels
 _HEIGHT, _HEIGHT_OF_SEVERAL = 340, 255  # height of the only panel, and of one of several, px
 _FONT_SIZE = 13  # size of all text of a chart, px
 
@@ -95,7 +93,7 @@ class Line:
     def draw(self, figure: "Figure") -> None:
         """Draw it into its panel."""
         edges = (self.y,) if self.upper is None else (self.y, self.upper)
-        places = drawn_places(_COLUMNS, *edges)
+        places = drawn_places(600, *edges)  # the widest chart has 900 pixels
         x, y, *upper = (np.asarray(values, dtype=np.float64)[places] for values in (self.x, *edges))
         width = 1.3 if len(places) == np.size(self.y) else 1.0
         style: dict[str, Any] = {"mode": "lines", "line": {"color": self.colour, "width": width}}

@@ -24,8 +24,6 @@ from ..base.signals import Array, check_position
 from ..base.state import FIXED, arrays_of, pack, restored, restoring, unpack
 from ..predict.predictor import HybridPredictor
 
-_N_OVER = 3  # samples in a row above the limit that trip, missing ones aside: one or two may be the sensor's outliers
-
 
 class SepState(IntEnum):
     """Model that the commands of a window are planned with; as an output also that the monitor tripped."""
@@ -79,7 +77,7 @@ class Monitor:
     @property
     def is_tripped(self) -> bool:
         """Whether the change of the command fades until a reset."""
-        return self.n_over >= _N_OVER
+        return self.n_over >= 3  # in a row, missing ones aside: one or two may be the sensor's outliers
 
     def take_in(self, error: float) -> bool:
         """Take in a sample's following error, measured position minus command as it came, m; NaN where missing.

@@ -26,8 +26,7 @@ _Curve = Callable[[Array], Array]
 _PANELS = 2000  # panels of a path, over which its length is integrated
 SAMPLES_MAX = 2_000_000  # largest number of samples of a generated trajectory: over half an hour at 1 kHz
 
-PAPER_LIMITS = Limits(velocity=0.08, acceleration=8.0, jerk=1000.0)
-"""Eq. (14): 80 mm/s, 8 m/s², 1000 m/s³."""
+PAPER_LIMITS = Limits(velocity=0.08, acceleration=8.0, jerk=1000.0)  # eq. (14)
 
 
 def rest_to_rest(
