@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 _Curve = Callable[[Array], Array]
 
-_PANELS = 2000  # panels of a path, over which its length is integrated
 SAMPLES_MAX = 2_000_000  # largest number of samples of a generated trajectory: over half an hour at 1 kHz
 
 PAPER_LIMITS = Limits(velocity=0.08, acceleration=8.0, jerk=1000.0)  # eq. (14)
@@ -153,7 +152,7 @@ def along_path(position: _Curve, derivative: _Curve, end: float, limits: Limits,
     ``position`` and ``derivative``, (n,) → (n, d), m, are the path and its derivative over a parameter from 0 to
     ``end`` > 0; the derivative is never zero inside. The arc length is inverted to 1e-12 of the total.
     """
-    nodes = np.linspace(0.0, end, _PANELS + 1)
+    nodes = np.linspace(0.0, end, 2001)  # between panels, over which the length is integrated
     arc = np.concatenate(([0.0], np.cumsum(_panel_lengths(derivative, nodes[:-1], nodes[1:]))))  # up to each node
     s = rest_to_rest([0.0, arc[-1]], limits, T_s)
     u = np.interp(s, arc, nodes)
