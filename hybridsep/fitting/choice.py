@@ -20,6 +20,7 @@ from .replay import Recording, replay
 
 WORTH = 0.05  # relative gain below which the default settings stay: less may be chance
 _SHARES = (0.1, 0.25, 1.0)  # numbers of lags ``p`` that are tried besides the default, in windows
+_Q = (1,)  # numbers of lags ``q`` of the physics-based position that are tried besides the default
 _GAIN = 0.9  # ratio of the errors with and without a period below which it is worth a hint
 
 
@@ -44,8 +45,8 @@ def settings_to_try(
     """Return the settings and others with the same window, with lags ``p`` if some are given, else at most ``most``."""
     Np = settings.Np
     lags = dict.fromkeys([settings.p, *(p or (min(max(1, round(share * Np)), most) for share in _SHARES))])
-    fewer = [replace(settings, q=1)] if settings.q != 1 and Np > 1 else []  # lags of the physics-based position
-    return [*(replace(settings, p=p) for p in lags), *fewer]
+    found = [replace(settings, p=p) for p in lags]
+    return found + [replace(settings, q=q) for q in _Q if q < Np and q != settings.q]
 
 
 def choose_settings(
