@@ -123,15 +123,25 @@ STRUCTURES = tuple(replace(form, unit_gain=unit_gain) for form in _FORMS for uni
 """Structures by number of parameters, the simplest first."""
 
 
-def polynomials(theta: Array, T_s: float, input_hold: str) -> tuple[Array, Array]:
-    """Return numerators, ``(2, 3)``, and denominator, ``(3,)``, in z⁻¹, of a mode of ``theta``, ln ω and ln ζ.
+def polynomials(
+    theta: Sequence[float] | Array, T_s: float, input_hold: str, *, zero: bool = True
+) -> tuple[Array, Array]:
+    """Return numerators ``(1 or 2, m + 1)`` and denominator, in z⁻¹, of a mode, m = 2, or of the lag, m = 1.
 
-    The first numerator is the response's with a static gain of 1, the second one that of ``ω s/(s² + 2 ζ ω s + ω²)``.
+    ``theta``, ``(m,)``, are its nonlinear parameters. The first numerator is the response's with a static gain of 1,
+    with a ``zero`` the second one that of a mode ``ω s/(s² + 2 ζ ω s + ω²)``.
     """
-    omega, zeta = np.exp(theta)
-    A, b = np.array([[0.0, omega], [-omega, -2 * zeta * omega]]), np.array([0.0, omega])
+    if len(theta) == 2:
+        omega, zeta = np.exp(theta)
+        A, b = np.array([[0.0, omega], [-omega, -2 * zeta * omega]]), np.array([0.0, omega])
+    else:
+        b = np.exp(np.asarray(theta))
+        A = -b[None]
     A, b, d = discretised_block(A, b, T_s, input_hold)
     trace = A.trace()
-    denominator = np.array([1.0, -trace, A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]])
+    columns, denominator = [np.zeros(len(b)), b], [1.0, -trace]
+    if len(theta) == 2:
+        columns.append(A @ b - trace * b)
+        denominator.append(A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0])
     # s(k+1) = A s(k) + b u(k), the states being s + d u: (z I − A)⁻¹ b + d
-    return np.column_stack((np.zeros(2), b, A @ b - trace * b)) + np.outer(d, denominator), denominator
+    return (np.column_stack(columns) + np.outer(d, denominator))[: 1 + zero], np.array(denominator)
