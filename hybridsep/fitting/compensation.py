@@ -54,7 +54,6 @@ _GAIN = 0.05  # relative gain from which on a limit twice as large, or a longer 
 
 _TRIED_MAX = 10_000  # leading samples on which a compensator is tried
 _AHEAD = (0.025, 0.05, 0.1, 0.2, 0.4)  # look-aheads, s, that are tried, doubled until a quarter of the model's is there
-_DEMANDING = 2000  # most samples of the stretch on which limits and look-aheads are tried
 _LIGHTER = 1e-3  # ``jerk_weight`` relative to the machine's with which plans that it binds leave less
 _LITTLE = 0.01  # share of the error without compensation below which errors are alike
 
@@ -382,7 +381,7 @@ def expected_tracking(
 
 @dataclass(frozen=True)
 class Stretch:
-    """Most demanding stretch of commands, on which the physics model plans for a drive that is exactly it.
+    """Most demanding 2000 commands, on which the physics model plans for a drive that is exactly it.
 
     Nothing is learned, and no residual is added: of a drive that differs from its model more is left.
     """
@@ -398,7 +397,7 @@ class Stretch:
         """Return the stretch where the model alone errs most; None where it has no error to compensate."""
         machine = trial.machine
         model, known = machine.model, machine.compensator_predictor
-        discrete, n = model.discretise(known.T_s, known.input_hold), min(_DEMANDING, 5 * machine.look_ahead)
+        discrete, n = model.discretise(known.T_s, known.input_hold), min(2000, 5 * machine.look_ahead)
         most, lead, steps = 0.0, n // 4, np.empty(0)
         for one in recordings:
             x_d = one.x_d - one.x_d[0]

@@ -28,7 +28,6 @@ from ..plants.stage_drive import StageDrive
 from .replay import Recording
 
 _FITTED = 2 / 3  # share of the training samples that the fit takes; the others choose
-_WORTH = 0.9  # error relative to the identified model's alone from which a disturbance is kept
 _TRIED_MAX = 20_000  # most samples of the commands to try with: 20 s at 1 kHz, which a co-simulation takes seconds for
 
 _MODE_STEPS, _MODE_REACH = (0.1, 0.3, 0.05, 0.05), (1.0, 2.0, 1.0, 1.0)
@@ -129,7 +128,7 @@ def identified_plant(
     candidates = [alone, *_refined(alone, settings, begun)]
     errors = [_rms_of(settings, one, pieces, "choosing") for one in candidates]
     best = int(np.argmin(errors))  # the first where none is known
-    if not errors[best] < _WORTH * errors[0]:
+    if not errors[best] < 0.9 * errors[0]:  # no disturbance is worth it
         best = 0
     chosen = candidates[best]
     entries = {**(chosen.entries() if best else {}), "noise_std": float(f"{_noise(settings, chosen, pieces):.3g}")}

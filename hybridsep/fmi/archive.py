@@ -21,8 +21,6 @@ from .flavours import FLAVOURS, FMI_VERSIONS
 from .spec import FmuSpec, fmu_name, fmu_names
 from .weights import saved_weights
 
-_FIRST = ("modelDescription.xml", "SystemStructure.ssd")
-
 
 def build_fmu(
     machine: Machine,
@@ -102,9 +100,9 @@ def archived(files: Mapping[str, bytes]) -> bytes:
 
     What readers that stream look for comes first.
     """
-    file = io.BytesIO()
+    file, first = io.BytesIO(), ("modelDescription.xml", "SystemStructure.ssd")
     with zipfile.ZipFile(file, "w") as archive:
-        for arcname in sorted(files, key=lambda key: (key not in _FIRST, key)):
+        for arcname in sorted(files, key=lambda key: (key not in first, key)):
             entry = zipfile.ZipInfo(arcname)  # of 1980, its default
             entry.external_attr, entry.create_system = 0o644 << 16, 3
             how = zipfile.ZIP_STORED if arcname.endswith(".fmu") else zipfile.ZIP_DEFLATED

@@ -46,7 +46,6 @@ _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 
 _START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
 _COUNTS, _IN_A_SAMPLE, _WHOLE = 2**16, 0.1, 1e-2  # of a counter: range, motion in a sample relative to it, rounding
-_LATE = 0.1  # lag, s, from which it is noted: the look-ahead of a controller of which nothing is known
 
 _USUAL = 0.98  # quantile of what is usual, beyond which are the samples that are looked for
 
@@ -384,9 +383,9 @@ def _note_rate(log: Log) -> Iterator[Finding]:
 
 
 def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterator[Finding]:
-    """Note a measured position that is late, or counts from another zero."""
+    """Note a measured position that is late by more than the usual look-ahead, 0.1 s, or counts from another zero."""
     late, least = found.lag_of_one, "at least " if found.lag_of_one >= min(_LAG_MAX, len(x_d) // 4) else ""
-    if late * log.T_s > _LATE and found.lag < 1.5 * late:  # noise spreads a mixture over lags
+    if late * log.T_s > 0.1 and found.lag < 1.5 * late:  # noise spreads a mixture over lags
         words = (
             f"the measured position lags its command by {least}{late} samples ({late * log.T_s:.3g} s), drive, dead "
             "time and recorder together"

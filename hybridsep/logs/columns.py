@@ -10,7 +10,7 @@ import numpy as np
 from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
 from .names import ROLES, axes_of, has_word, known_names, signals_of
-from .source import Block, Source, sample_number
+from .source import Block, Source
 from .text import is_number, stamp_kind
 from .times import COUNTED
 from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
@@ -342,5 +342,5 @@ def side_by_side(source: Source, columns: Mapping[str, Column], *, resample: boo
             "resampled; record it without, or both columns at one rate"
         )
     found = {slow: values, fast: np.interp(at, t, followed)}
-    block = Block([found.get(name, at) for name in names.values()], sample_number)
+    block = Block([found.get(name, at) for name in names.values()])
     return block, f"resampled onto the times of the slower column: {rates}"

@@ -19,7 +19,7 @@ class Block:
     # one (m,) for each requested name, as in the file, not checked for NaN, timestamps as seconds since the first one
     columns: list[Array]
     # location of sample ``i`` of the block for messages: a line of the file, or a sample of the log
-    where: Callable[[int], str]
+    where: Callable[[int], str] = lambda i: f"sample {i + 1} (the first is 1)"
 
 
 class Source(ABC):
@@ -77,14 +77,9 @@ class ArraysSource(Source):
         if len(set(lengths.values())) > 1:
             text = ", ".join(f"{brief(name)} has {length}" for name, length in lengths.items())
             raise LogError(f"{self.path}: all columns must have the same number of samples, got: {text}")
-        return Block(columns, sample_number)
+        return Block(columns)
 
 
 def past_midnights(times: Array, day: float) -> Array:
     """Return times of day, ``(n,)``, which pass midnight where they fall by more than half a ``day``."""
     return np.asarray(times + day * np.cumsum(np.diff(times, prepend=times[:1]) < -day / 2))
-
-
-def sample_number(i: int) -> str:
-    """Return the location, for messages, of sample ``i`` of a log."""
-    return f"sample {i + 1} (the first is 1)"

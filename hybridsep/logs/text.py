@@ -28,7 +28,6 @@ from .names import n_known
 from .source import Block, Source, past_midnights
 from .units import plain_name, position_unit, time_unit
 
-_HEAD_LINES = 1000  # lines, blank ones aside, in which names and numbers must begin
 _BLOCK = 10_000  # lines that are converted at once
 
 _COMMENTS = ("#", "%", "//", "!")  # beginnings of a comment line
@@ -112,7 +111,7 @@ class TextSource(Source):
                 self._encoding = _encoding(file.read(1 << 16))
             with self._open() as text:
                 numbered = ((i, line) for i, line in enumerate(text, 1) if not line.isspace())
-                table = _find_table(list(islice(numbered, _HEAD_LINES)))
+                table = _find_table(list(islice(numbered, 1000)))  # in which names and numbers must begin
         except _DAMAGE as error:
             raise LogError(f"{path}: is truncated or damaged: {first_line(error)}") from error
         if table is None:
