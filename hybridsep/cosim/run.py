@@ -189,7 +189,7 @@ class Run:
 
 
 def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
-    """Write arrays ``(n,)`` by name: ``.csv``, one row each, truth values as 0 and 1, or ``.npz``; or ValueError."""
+    """Write arrays ``(n,)`` by name as ``.csv``, truth values as 0 and 1, or ``.npz``; ValueError for another suffix."""
     path = as_path(path)
     suffix = path.suffix.lower()
     if suffix == ".npz":

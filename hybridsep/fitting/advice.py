@@ -203,7 +203,7 @@ def extent(logs: Sequence[Log]) -> str:
     if n_used < 0.995 * n_recorded:  # else the file counts as used, all of it
         words = f"{n_used} of {n_recorded} samples ({100 * n_used / n_recorded:.3g} %)"
     words += f", {n * T_s:.4g} s at {1 / T_s:.4g} Hz"
-    if own and abs(T_s / own - 1.0) > 0.01:
+    if own and abs(T_s / own - 1.0) > 0.01:  # else both rates are one
         words += f" (recorded at {1 / own:.4g} Hz)"
     segments = sum(len(log.starts) for log in logs)
     if segments == len(logs):

@@ -106,9 +106,8 @@ def archived(files: Mapping[str, bytes]) -> bytes:
             entry = zipfile.ZipInfo(arcname)  # of 1980, its default
             entry.external_attr, entry.create_system = 0o644 << 16, 3
             how = zipfile.ZIP_STORED if arcname.endswith(".fmu") else zipfile.ZIP_DEFLATED
-            archive.writestr(
-                entry, files[arcname], how, 6
-            )  # deflate's level is fixed, as another one gives other bytes
+            # deflate's level is fixed: another one, like another implementation, gives other bytes
+            archive.writestr(entry, files[arcname], how, 6)
     return file.getvalue()
 
 

@@ -232,7 +232,7 @@ def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Find
     """Find columns that mean something else: exchanged, a flipped sign, another unit, no position, another axis."""
     known = np.isfinite(x)
     evidence, gains = given._asdict(), (given.gain, given.gain_at_one)
-    filled = np.interp(np.arange(len(x)), np.flatnonzero(known), x[known])  # where it is missing
+    filled = np.interp(np.arange(len(x)), np.flatnonzero(known), x[known])  # also where it is missing
     exchanged = following(filled, np.where(known, x_d, np.nan))
     noise = noise_std(x_d) / _travel(x_d), noise_std(filled) / _travel(x)
     better = _BETTER if noise[0] > _NOISIER * noise[1] else _BETTER_SWAPPED

@@ -325,12 +325,12 @@ def _turn_jumps(x: Array) -> Indices:
     """Return the samples at which a position, NaN where it is missing, is one turn away from where it was before."""
     known = np.flatnonzero(np.isfinite(x))
     steps = np.diff(x[known])
-    if len(known) < 2 or np.ptp(x[known]) > 1.05 * _TURN:  # with its noise
+    if len(known) < 2 or np.ptp(x[known]) > 1.05 * _TURN:  # one turn with its noise
         return np.empty(0, dtype=np.intp)
     far = np.abs(steps) > _TURN / 2
     usual = float(np.abs(steps[~far]).max(initial=0.0))
     off = np.abs(np.abs(steps) - _TURN)
-    return np.asarray(known[1:][far & (off <= 3.0 * usual) & (off < _TURN / 2)])
+    return np.asarray(known[1:][far & (off <= 3.0 * usual) & (off < _TURN / 2)])  # a jump is a turn and a step
 
 
 def _error(x_d: Array, x_meas: Array) -> float:
