@@ -189,7 +189,7 @@ class Run:
 
 
 def save_columns(columns: Mapping[str, Any], path: str | Path) -> None:
-    """Write arrays ``(n,)`` by name as ``.csv``, truth values as 0 and 1, or ``.npz``; ValueError for another suffix."""
+    """Write arrays ``(n,)`` by name, truth values as 0 and 1: ``.csv`` or ``.npz``, ValueError for another suffix."""
     path = as_path(path)
     suffix = path.suffix.lower()
     if suffix == ".npz":
