@@ -184,13 +184,14 @@ static void compensator_solve(hsep_compensator *self)
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_int pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
     const hsep_int left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
-    int done = 0;
-    if (self->averaged) {
+    int done = left <= 1;
+    if (self->averaged) { /* it is followed when it is due, so nothing depends on when it is made */
         const hsep_newton_task task = compensator_task(self);
-        done = hsep_newton_run(hsep_compensator_newton(self), &task, left);
+        hsep_newton_run(hsep_compensator_newton(self), &task, left);
         self->state = done ? hsep_compensator_newton(self)->planned : self->state;
     } else { /* parts of the solver's steps, all that are left of them in the last sample */
         const hsep_int due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
+        done = 0;
         for (hsep_int part = 0; !done && part < due; part++) {
             done = hsep_planner_advance(hsep_compensator_planner(self));
         }

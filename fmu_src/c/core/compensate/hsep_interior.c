@@ -294,42 +294,36 @@ static int interior_residuals(hsep_interior *self, const interior_arrays *a, con
     return 0;
 }
 
-/* A part of the factor of P + A' W A, 0 to 2; return whether there is none. Work, not rows, is divided. */
-static int interior_factor(const interior_arrays *a, const hsep_real P[], hsep_int part)
+/* The factor of P + A' W A, in place of P; return whether there is none. */
+static int interior_factor(const interior_arrays *a, const hsep_real P[])
 {
-    const hsep_int panel = HSEP_CHOLESKY_PANEL, ends[] = {0, a->n / 12 / panel * panel, a->n / 4 / panel * panel, a->n};
-    if (part == 0) {
-        hsep_copy(a->factor, P, (hsep_int)hsep_triangle(a->n));
-        const slacks it = a->slacks;
-        for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* the weights W */
-            AT(ds) = AT(z) * AT(inverse);
-        }
-        slacks_give_rows(&it, it.ds, 1.0);
-        hsep_splines_gram(a->splines, a->slacks.rows, a->first, a->problem.products, a->slacks.work);
-        hsep_knots_add(a->knots, a->problem.products, a->factor, a->problem.c);
+    const slacks it = a->slacks;
+    hsep_copy(a->factor, P, (hsep_int)hsep_triangle(a->n));
+    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* the weights W */
+        AT(ds) = AT(z) * AT(inverse);
     }
-    return !hsep_cholesky_rows(a->factor, a->n, ends[part], ends[part + 1], NULL);
+    slacks_give_rows(&it, it.ds, 1.0);
+    hsep_splines_gram(a->splines, a->slacks.rows, a->first, a->problem.products, a->slacks.work);
+    hsep_knots_add(a->knots, a->problem.products, a->factor, a->problem.c);
+    return !hsep_cholesky_rows(a->factor, a->n, 0, a->n, NULL);
 }
 
 HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
 {
     const interior_arrays a = interior_open(self, splines);
-    const hsep_int part = self->part;
-    self->part = (part + 1) % HSEP_INTERIOR_PARTS;
-    if (part < 4) {
-        return part == 0 ? interior_residuals(self, &a, P) : interior_factor(&a, P, part - 1);
+    self->part = !self->part;
+    if (self->part) {
+        return interior_residuals(self, &a, P) || interior_factor(&a, P);
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a);
-    if (part == 4) {
-        const slacks it = a.slacks;
-        const hsep_real mu = self->mu, ratio = slacks_predicted(&it) / mu; /* mu_aff / mu; sigma = ratio^3 */
-        const hsep_real centre = hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost);
-        for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* with the curvature ds dz that the predictor shows */
-            AT(r_c) = (centre - AT(s) * AT(z) - AT(ds) * AT(dz)) * AT(inverse);
-        }
-        return 0;
+    const slacks it = a.slacks;
+    const hsep_real mu = self->mu, ratio = slacks_predicted(&it) / mu; /* mu_aff / mu; sigma = ratio^3 */
+    const hsep_real centre = hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost);
+    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* with the curvature ds dz that the predictor shows */
+        AT(r_c) = (centre - AT(s) * AT(z) - AT(ds) * AT(dz)) * AT(inverse);
     }
-    hsep_axpy(a.problem.x, slacks_move(&a.slacks), a.dx, a.n);
+    interior_direction(&a);
+    hsep_axpy(a.problem.x, slacks_move(&it), a.dx, a.n);
     return 0;
 }

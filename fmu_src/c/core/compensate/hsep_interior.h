@@ -19,13 +19,13 @@ typedef struct {
     hsep_real first_mu;      /* mu at the beginning, as that at the end */
 } hsep_tolerance;
 
-#define HSEP_INTERIOR_PARTS 6 /* of a step */
+#define HSEP_INTERIOR_PARTS 2 /* of a step */
 
 typedef struct {
     hsep_tolerance tolerance;
     hsep_knots knots; /* of x, (m,); the splines before them are fixed */
     hsep_int steps;   /* begun for this plan */
-    hsep_int part;    /* of the last one that comes next: residuals, 1 to 3 the factor, predictor, corrector */
+    hsep_int part;    /* whether the last one has its factor */
     hsep_real mu;     /* m2, of its beginning */
     hsep_real cost;   /* m2, scale of the cost per bound */
     hsep_real rho;    /* 1/m2, proximal regularisation of the multipliers */

@@ -367,140 +367,76 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
-/* Work is counted in multiply-adds of loops over arrays. As so many counts a number that is computed apart, with
- * branches, divisions or loads for itself alone; and a sample of a mode. */
-#define NEWTON_NUMBER 20.0
-#define NEWTON_MODE 9.0
+/* What parts of a plan count as, relative to some rows of a programme, or some samples that are predicted without
+ * variances: what passes through the model or the solver once, for all samples of a plan, counts as this, */
+#define NEWTON_PASS 4
+/* columns abreast that begin with the plan, with several experts, as that, and HSEP_NEWTON_VARIED variances as */
+#define NEWTON_COLUMNS 3
+#define NEWTON_VARIANCES 2
 
-/* Multiply-adds of the parts of a plan, counted from the sizes. */
-typedef struct {
-    hsep_real number;    /* one of every sample of the plan */
-    hsep_real commands;  /* commands of a plan, and their disturbances */
-    hsep_real sample;    /* a sample of its prediction, with its variance, */
-    hsep_real row;       /* and a row of features for variances */
-    hsep_real predict;   /* half of a prediction without variances, and of its cost */
-    hsep_real linearise; /* slopes of the disturbances, and gains with them, */
-    hsep_real column;    /* and a sample of the changes by some splines abreast */
-    hsep_real open;      /* a programme that is not of a Newton step, */
-    hsep_real solve;     /* the factor of one, its bounds, and whether they allow its minimum, */
-    hsep_real step;      /* and a part of a solver's step */
-} newton_work;
+/* Parts into which a count is cut, each of at most so many. */
+static hsep_int newton_parts(hsep_int count, hsep_int most) { return (count + most - 1) / most; }
 
-static newton_work newton_work_of(const hsep_newton *self, const hsep_newton_task *task)
+/* What a part of a solver's step counts as, most of which is a factor, */
+static hsep_int newton_of_solver(const hsep_newton *self) { return 1 + self->m / 20; }
+
+/* a solution of a programme in so many steps, with its beginning and the residuals at its end, */
+static hsep_int newton_of_solution(const hsep_newton *self, hsep_int steps)
 {
-    const hsep_physics *physics = hsep_part_const(self, self->physics);
-    const hsep_real all = (hsep_real)(self->preview + self->late);
-    const hsep_real modes = NEWTON_MODE * (hsep_real)physics->n_modes;
-    const hsep_real n = (hsep_real)(self->ends ? task->planner->knots.n : self->m), pairs = n * n;
-    newton_work work = {.number = NEWTON_NUMBER * (hsep_real)self->preview, .column = 1.0};
-    hsep_real run = HSEP_N_EXPERTS * NEWTON_NUMBER; /* the stack */
-    work.sample = run;
-    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
-        if (task->model->predicted[i]) {
-            const hsep_expert *expert = hsep_averaged_expert(task->model, i);
-            const hsep_real m = (hsep_real)(expert->p + expert->n_static);
-            run += m + 3.0 * NEWTON_NUMBER;                     /* in free run, within bounds, shrunk */
-            work.sample += 2.0 * m + all + 3.0 * NEWTON_NUMBER; /* with the variances before it */
-            work.row += 0.5 * m * (m + NEWTON_NUMBER);
-            if (hsep_averaged_kind_of(task->model, i) == HSEP_MODEL_RESIDUAL && task->model->shares[i] > 0.0) {
-                work.column += 0.7 * (hsep_real)expert->p + modes + 16.0; /* early: less p */
-            }
-        }
+    return NEWTON_PASS + newton_of_solver(self) * (HSEP_INTERIOR_PARTS * steps + 1);
+}
+
+/* and columns abreast from one on. */
+static hsep_int newton_of_columns(hsep_newton *self, hsep_int first)
+{
+    return newton_parts(NEWTON_COLUMNS * (self->preview - newton_begins(self)[first]), self->preview);
+}
+
+/* What the parts of the longest plan count as, samples of whose window are predicted already. A second length of a
+ * Newton step, rarely tried, adds a prediction. */
+static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, hsep_int predicted)
+{
+    const hsep_int window = self->late + self->Np, behind = self->preview - self->Np;
+    const hsep_int variances = newton_parts(window - predicted, HSEP_NEWTON_VARIED) +
+                               newton_parts(behind, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) +
+                               newton_parts(window, HSEP_NEWTON_VARIED);
+    hsep_int columns = 0;
+    for (hsep_int i = 0; i < self->m; i += newton_together(planner, i)) {
+        columns += newton_of_columns(self, i);
     }
-    /* tanh counts as two; change, command, x_pb, velocity, two of the position; what is filtered */
-    work.commands = all * NEWTON_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
-                    all * modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
-    work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
-    work.linearise = all * NEWTON_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + 14.0);
-    work.open = 20.0 * work.number + 5.0 * pairs;
-    /* row, bound, slack, multiplier of each order */
-    work.solve = 5.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.5);
-    work.step = (10.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.0)) / HSEP_INTERIOR_PARTS;
-    return work;
+    const hsep_int prediction = NEWTON_PASS + HSEP_NEWTON_PREDICTED;
+    const hsep_int step = NEWTON_PASS + columns + newton_parts(self->m, HSEP_NEWTON_PRODUCTS) +
+                          newton_of_solution(self, newton_tolerance.steps) + prediction;
+    return NEWTON_VARIANCES * (variances + 1) + newton_of_solution(self, HSEP_NEWTON_PHYSICS_STEPS) +
+           self->n_steps * step + prediction + NEWTON_PASS;
 }
 
-/* Products of the columns of some splines with all behind them. */
-static hsep_real newton_of_products(hsep_newton *self, hsep_int begin, hsep_int end)
-{
-    hsep_real sum = 0.0;
-    for (hsep_int i = begin; i < end && i < self->m; i++) {
-        const hsep_int length = self->preview - newton_begins(self)[i];
-        sum += 0.7 * (hsep_real)(self->m - i) * ((hsep_real)length + NEWTON_NUMBER);
-    }
-    return sum;
-}
-
-/* Columns from one on, with what begins the linearisation of a distance of knots. */
-static hsep_real newton_of_columns(
-    hsep_newton *self, const hsep_planner *planner, const newton_work *work, hsep_int first)
-{
-    const hsep_real length = (hsep_real)(self->preview - newton_begins(self)[first]);
-    const int is_first = hsep_knots_at(&planner->knots, first).first == first;
-    return HSEP_PHYSICS_ABREAST * length * work->column + (is_first ? 6.0 * work->number : 0.0);
-}
-
-/* Predict the next part of the samples under a plan: with its commands the first ones, then half of all each time; with
- * variances a few, one for each in the window. Return what it takes; without a plan it is counted only. */
-static hsep_real newton_predict(
-    hsep_newton *self, const hsep_newton_task *task, const newton_work *work, const hsep_real c[], int varies)
+/* Predict the next part of the samples under a plan, with its commands the first ones. varies: with variances, one for
+ * each sample in the window, and one for some behind it. */
+static void newton_predict(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[], int varies)
 {
     const hsep_int first = self->samples, all = self->late + self->preview, window = self->late + self->Np;
     const hsep_int apart = !varies ? 0 : first < window ? 1 : HSEP_NEWTON_APART; /* as hsep_averaged_go_on has it */
-    const hsep_int most = varies ? apart * HSEP_NEWTON_VARIED : first == 0 ? all / HSEP_NEWTON_AT_FIRST : all / 2;
+    const hsep_int most = varies ? apart * HSEP_NEWTON_VARIED : newton_parts(all, HSEP_NEWTON_PREDICTED);
     const hsep_int count = hsep_min((apart == 1 ? window : all) - first, most);
     hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
-    if (c != NULL && first == 0) {
+    if (first == 0) {
         newton_command(self, task, c, HSEP_N_DECIDED + self->n);
         hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, count, apart);
-    } else if (c != NULL) {
+    } else {
         hsep_averaged_go_on(task->model, x_pb, e_h, first, first + count, apart);
     }
-    self->samples += c != NULL ? count : 0;
-    if (!varies) {
-        return first == 0 ? work->predict : 0.5 * work->predict;
-    }
-    const hsep_real rows = (hsep_real)((count + apart - 1) / apart);
-    return (hsep_real)count * work->sample + rows * work->row + (first == 0 ? work->commands : 0.0);
+    self->samples += count;
 }
 
-/* The work that is left of a plan, nearly always at most, where it begins, or behind the Newton steps. */
-static hsep_real newton_left(hsep_newton *self, const hsep_newton_task *task, const newton_work *work)
-{
-    const hsep_int window = self->late + self->Np, behind = self->preview - self->Np, first = self->samples;
-    const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
-    hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
-    left += hsep_planner_carrying(task->planner);
-    left += self->judges ? 2.0 * work->predict : 0.0; /* of the physics model's plan */
-    if (self->place > 0) {
-        return left;
-    }
-    if (self->judges) {
-        left += (hsep_real)(window - first + behind) * work->sample +
-                (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
-    }
-    if (self->planned) {
-        left += work->open + work->solve + (hsep_real)newton_physics_steps(self) * parts;
-    }
-    if (self->ends) {
-        left += work->open + work->solve + (hsep_real)newton_tolerance.steps * parts;
-    }
-    if (self->follows) {
-        hsep_real newton = work->linearise + newton_of_products(self, 0, self->m) + work->solve +
-                           3.0 * work->predict; /* one length of it is enough nearly always */
-        for (hsep_int i = 0; i < self->m; i += newton_together(task->planner, i)) {
-            newton += newton_of_columns(self, task->planner, work, i);
-        }
-        left += (hsep_real)self->n_steps * (newton + (hsep_real)newton_tolerance.steps * parts);
-    }
-    return left;
-}
-
-/* Cut a plan: what follows costs so much, and is done when newton_go_on is called again; where: another one for each. A
- * switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006), with what the block has. */
-#define NEWTON_YIELD(where, cost) \
+/* Cut a plan: what follows counts as so much, and is done when newton_go_on is called again; where: another one for
+ * each. A switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006), with what the block
+ * has. */
+#define NEWTON_MADE 99 /* place behind the last yield */
+#define NEWTON_YIELD(where, count) \
     do { \
         self->place = (where); \
-        self->next = (cost); \
+        self->next = (count); \
         return; \
     case (where):; \
     } while (0)
@@ -508,21 +444,20 @@ static hsep_real newton_left(hsep_newton *self, const hsep_newton_task *task, co
 /* Predict more samples under a plan, up to one. */
 #define NEWTON_PREDICT(where, end, c, varies) \
     while (self->samples < (end)) { \
-        NEWTON_YIELD(where, newton_predict(self, task, &work, NULL, varies)); \
-        (void)newton_predict(self, task, &work, c, varies); \
+        NEWTON_YIELD(where, (self->samples > 0 ? 0 : NEWTON_PASS) + ((varies) ? NEWTON_VARIANCES : 1)); \
+        newton_predict(self, task, c, varies); \
     }
 
 /* Solve a programme in so many steps of its solver. */
 #define NEWTON_SOLVE(where, steps) \
     for (self->status = HSEP_PLAN_OPEN; self->status >= HSEP_PLAN_BOUNDED;) { \
-        NEWTON_YIELD(where, self->status == HSEP_PLAN_OPEN ? work.solve : work.step); \
+        NEWTON_YIELD(where, self->status == HSEP_PLAN_OPEN ? NEWTON_PASS : newton_of_solver(self)); \
         newton_solve(self, task, steps); \
     }
 
 /* Make a plan, from one yield to the next. */
 static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 {
-    const newton_work work = newton_work_of(self, task);
     const hsep_int all = self->late + self->preview;
     hsep_planner *planner = task->planner;
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
@@ -541,7 +476,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            NEWTON_YIELD(2, work.open);
+            NEWTON_YIELD(2, NEWTON_VARIANCES);
             newton_open(self, task);
             NEWTON_SOLVE(3, newton_physics_steps(self))
             self->planned = self->status == HSEP_PLAN_DONE;
@@ -555,7 +490,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->cost_of_rest = self->cost;
         if (self->ends) {
             newton_copy(self, c, rest);
-            NEWTON_YIELD(4, work.open);
+            NEWTON_YIELD(4, NEWTON_VARIANCES);
             hsep_planner_end(planner, task->x_d);
             NEWTON_SOLVE(5, newton_tolerance.steps)
         }
@@ -572,23 +507,23 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
                 NEWTON_PREDICT(15, all, hsep_at(self, self->best), 0)
             }
             if (self->steps > 0) {
-                NEWTON_YIELD(16, work.open);
+                NEWTON_YIELD(16, NEWTON_VARIANCES);
                 newton_copy(self, c, hsep_at(self, self->best));
                 hsep_planner_open(planner, task->x_d);
             }
             hsep_planner_may_turn(planner); /* the model follows the friction */
             planner->change = self->bound;
-            NEWTON_YIELD(7, work.linearise);
+            NEWTON_YIELD(7, NEWTON_PASS);
             (void)newton_errors(self, task);
             hsep_linearised_at(
                 hsep_part(self, self->linearised), task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb),
                 self->reach);
             for (self->spline = 0; self->spline < self->m;) {
-                NEWTON_YIELD(8, newton_of_columns(self, planner, &work, self->spline));
+                NEWTON_YIELD(8, newton_of_columns(self, self->spline));
                 newton_columns(self, task);
             }
             for (self->spline = 0; self->spline < self->m;) {
-                NEWTON_YIELD(9, newton_of_products(self, self->spline, self->spline + HSEP_NEWTON_PRODUCTS));
+                NEWTON_YIELD(9, 1);
                 newton_products(self, planner);
             }
             hsep_planner_complete(planner, planner->jerk_weight);
@@ -609,7 +544,6 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         }
 
         /* The best of them and the physics model's plan */
-        self->left = newton_left(self, task, &work);
         if (self->judges) {
             self->samples = 0;
             NEWTON_PREDICT(12, all, of_physics, 0)
@@ -617,10 +551,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         }
 
         /* What of it may be carried out */
-        if (hsep_planner_carrying(planner) > 0.0) {
-            NEWTON_YIELD(13, hsep_planner_carrying(planner));
-            hsep_planner_carry_out(planner, task->x_d);
-        }
+        hsep_planner_carry_out(planner, task->x_d);
 
         /* The window under the plan, and its variances */
         self->samples = 0;
@@ -630,20 +561,18 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
     default:
         break;
     }
-    self->place = 0;
-    self->next = 0.0;
+    self->place = NEWTON_MADE;
 }
 
-HSEP_API int hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples)
+HSEP_API void hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples)
 {
-    hsep_real done = 0.0, due;
-    do {
+    const hsep_int share = samples > 1 ? newton_parts(self->left, samples) : 0;
+    hsep_int done = 0;
+    while (self->place != NEWTON_MADE && (samples <= 1 || done + self->next <= share)) {
         done += self->next;
-        self->left -= self->next;
         newton_go_on(self, task);
-        due = samples > 1 ? (done + self->left) / (hsep_real)samples : INFINITY;
-    } while (self->place > 0 && done + 0.5 * self->next <= due);
-    return self->place == 0;
+    }
+    self->left -= done;
 }
 
 HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best)
@@ -677,9 +606,7 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
     self->judges = self->planned && (hsep_real)predictor->k >= predictor->n_init && task->model->predicted[HSEP_STATIC];
     self->follows = self->judges && best > 1;
     self->ends = best == 0 && was_planned > 0;
-    hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), 0); /* work follows from shares */
-    const newton_work work = newton_work_of(self, task);
-    /* This sample has cost that; what is learned at the end of the last window costs as much as commands of a plan */
-    self->next = 3.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
-    self->left = self->next + newton_left(self, task, &work);
+    /* This sample has begun, and learned the last window */
+    self->next = 2 * NEWTON_PASS + NEWTON_VARIANCES * newton_parts(self->samples, HSEP_NEWTON_VARIED);
+    self->left = self->next + newton_of_plan(self, task->planner, self->samples);
 }

@@ -18,11 +18,11 @@
 #include "hsep_predictor.h"
 #include "hsep_averaged_model.h"
 
-#define HSEP_NEWTON_TRIES 2    /* lengths of the last Newton step that are tried, */
-#define HSEP_NEWTON_VARIED 4   /* variances that are computed in a part, */
-#define HSEP_NEWTON_PRODUCTS 8 /* rows of a programme that are */
-#define HSEP_NEWTON_SHAPES 28  /* spacings of splines with knots 1, 2 and 4 of them apart: 4 each time */
-#define HSEP_NEWTON_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
+#define HSEP_NEWTON_TRIES 2     /* lengths of the last Newton step that are tried, */
+#define HSEP_NEWTON_VARIED 4    /* variances that are computed in a part, */
+#define HSEP_NEWTON_PRODUCTS 8  /* rows of a programme that are, */
+#define HSEP_NEWTON_PREDICTED 4 /* and parts of a prediction without variances */
+#define HSEP_NEWTON_SHAPES 28   /* spacings of splines with knots 1, 2 and 4 of them apart: 4 each time */
 
 typedef struct {
     hsep_int preview, Np;
@@ -48,8 +48,8 @@ typedef struct {
     hsep_real doubt;        /* m2, variance under the last plan's, weighted as errors */
     hsep_real bound;        /* share of change_max that bounds the averaged model's plan */
     hsep_real share;        /* of its change of the last plan that was taken last, but for what it doubts */
-    hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
-    hsep_real left;         /* and that this part and all after it nearly always take */
+    hsep_int next;          /* what the next part counts as, */
+    hsep_int left;          /* and at most it and all after it, nearly always */
     hsep_int rest;          /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_int best;          /* (3 + n,) m, coefficients of the best plan so far */
     hsep_int of_physics;    /* (3 + n,) m, coefficients of the physics model's plan */
@@ -94,6 +94,6 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
 /* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that is left,
  * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
  * Cost of a plan: as newton_left has it; a second length of a Newton step, rarely tried, adds a prediction. */
-HSEP_API int hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples);
+HSEP_API void hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples);
 
 #endif
