@@ -208,34 +208,6 @@ HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_spli
     return problem;
 }
 
-HSEP_API void hsep_interior_begin(
-    hsep_interior *self, const hsep_splines *splines, const hsep_knots *knots, const hsep_real P[], hsep_real cost,
-    const hsep_tolerance *tolerance)
-{
-    self->knots = *knots;
-    self->tolerance = *tolerance;
-    self->steps = self->part = 0;
-    interior_arrays a = interior_open(self, splines);
-    self->cost = cost / (hsep_real)a.slacks.n;
-    self->beyond = tolerance->margin;
-    /* The proximal term bounds A' W A by P / HSEP_QP_REGULARISATION: where active bounds hardly differ, rounding in it
-     * would outgrow P. That of a uniform spline: wide ones have up to four times as much. */
-    hsep_real largest = 0.0;
-    for (hsep_int i = 0; i < a.n; i++) {
-        largest = hsep_fmax(largest, P[0]);
-        P += a.n - i;
-    }
-    a.slacks.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
-    slacks_take_rows(&a.slacks, a.slacks.rows, a.slacks.work, a.slacks.b);
-    interior_rows(&a, a.problem.x);
-    const slacks it = a.slacks;
-    for (hsep_int r = 0; r < it.n; r++) {
-        it.s[r] = hsep_fmax(it.ds[r] - it.b[r], HSEP_QP_FIRST_SLACK);
-        it.z[r] = self->tolerance.first_mu * self->cost / it.s[r];
-        it.inverse[r] = 1.0 / (it.s[r] + it.rho * it.z[r]);
-    }
-}
-
 /* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its terms. */
 static hsep_real interior_dual_residual(const interior_arrays *a, const hsep_real *P)
 {
@@ -274,24 +246,48 @@ static void interior_direction(const interior_arrays *a)
     interior_rows(a, a->dx);
 }
 
-/* Begin a step with its residuals; return whether there is none, as the plan is solved. */
-static int interior_residuals(hsep_interior *self, const interior_arrays *a, const hsep_real P[])
+/* The residuals at x, and whether it is the solution. */
+static void interior_residuals(hsep_interior *self, const interior_arrays *a, const hsep_real P[])
 {
     hsep_real r_p, beyond;
     interior_rows(a, a->problem.x);
-    const hsep_real mu = slacks_take_residuals(&a->slacks, &r_p, &beyond);
+    const hsep_real mu = self->mu = slacks_take_residuals(&a->slacks, &r_p, &beyond);
     if (beyond < self->beyond) {
         self->beyond = beyond;
         hsep_copy(a->problem.inner, a->problem.x, a->n);
     }
     const hsep_real r_d = interior_dual_residual(a, P);
-    if (self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
-        (mu < self->tolerance.mu * self->cost && r_p < self->tolerance.margin && r_d < self->tolerance.dual_residual)) {
-        return 1;
+    self->solved =
+        self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
+        (mu < self->tolerance.mu * self->cost && r_p < self->tolerance.margin && r_d < self->tolerance.dual_residual);
+}
+
+HSEP_API void hsep_interior_begin(
+    hsep_interior *self, const hsep_splines *splines, const hsep_knots *knots, const hsep_real P[], hsep_real cost,
+    const hsep_tolerance *tolerance)
+{
+    self->knots = *knots;
+    self->tolerance = *tolerance;
+    self->steps = 0;
+    interior_arrays a = interior_open(self, splines);
+    self->cost = cost / (hsep_real)a.slacks.n;
+    self->beyond = tolerance->margin;
+    /* The proximal term bounds A' W A by P / HSEP_QP_REGULARISATION: where active bounds hardly differ, rounding in it
+     * would outgrow P. That of a uniform spline: wide ones have up to four times as much. */
+    hsep_real largest = 0.0;
+    for (hsep_int i = 0, diagonal = 0; i < a.n; diagonal += a.n - i++) {
+        largest = hsep_fmax(largest, P[diagonal]);
     }
-    self->steps++;
-    self->mu = mu;
-    return 0;
+    a.slacks.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
+    slacks_take_rows(&a.slacks, a.slacks.rows, a.slacks.work, a.slacks.b);
+    interior_rows(&a, a.problem.x);
+    const slacks it = a.slacks;
+    for (hsep_int r = 0; r < it.n; r++) {
+        it.s[r] = hsep_fmax(it.ds[r] - it.b[r], HSEP_QP_FIRST_SLACK);
+        it.z[r] = self->tolerance.first_mu * self->cost / it.s[r];
+        it.inverse[r] = 1.0 / (it.s[r] + it.rho * it.z[r]);
+    }
+    interior_residuals(self, &a, P);
 }
 
 /* The factor of P + A' W A, in place of P; return whether there is none. */
@@ -311,13 +307,12 @@ static int interior_factor(const interior_arrays *a, const hsep_real P[])
 HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
 {
     const interior_arrays a = interior_open(self, splines);
-    self->part = !self->part;
-    if (self->part) {
-        return interior_residuals(self, &a, P) || interior_factor(&a, P);
+    const slacks it = a.slacks;
+    if (self->solved || interior_factor(&a, P)) {
+        return 1;
     }
     /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
     interior_direction(&a);
-    const slacks it = a.slacks;
     const hsep_real mu = self->mu, ratio = slacks_predicted(&it) / mu; /* mu_aff / mu; sigma = ratio^3 */
     const hsep_real centre = hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost);
     for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* with the curvature ds dz that the predictor shows */
@@ -325,5 +320,7 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
     }
     interior_direction(&a);
     hsep_axpy(a.problem.x, slacks_move(&it), a.dx, a.n);
-    return 0;
+    self->steps++;
+    interior_residuals(self, &a, P);
+    return (int)self->solved;
 }

@@ -19,14 +19,12 @@ typedef struct {
     hsep_real first_mu;      /* mu at the beginning, as that at the end */
 } hsep_tolerance;
 
-#define HSEP_INTERIOR_PARTS 2 /* of a step */
-
 typedef struct {
     hsep_tolerance tolerance;
     hsep_knots knots; /* of x, (m,); the splines before them are fixed */
-    hsep_int steps;   /* begun for this plan */
-    hsep_int part;    /* whether the last one has its factor */
-    hsep_real mu;     /* m2, of its beginning */
+    hsep_int steps;   /* done for this plan */
+    hsep_int solved;  /* whether x is the solution */
+    hsep_real mu;     /* m2, at x */
     hsep_real cost;   /* m2, scale of the cost per bound */
     hsep_real rho;    /* 1/m2, proximal regularisation of the multipliers */
     hsep_real beyond; /* shares, by how much inner exceeds the worst bound; the margin: there is none */

@@ -175,16 +175,13 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
     self->spline += count;
 }
 
-/* Some rows of the programme of a Newton step, P = W' W, and of its linear term. */
+/* The programme of a Newton step, P = W' W, and its linear term. */
 static void newton_products(hsep_newton *self, hsep_planner *planner)
 {
-    const hsep_int m = self->m, preview = self->preview, first = self->spline;
-    const hsep_int end = hsep_min(first + HSEP_NEWTON_PRODUCTS, m);
+    const hsep_int m = self->m, preview = self->preview, *begins = newton_begins(self);
     const hsep_real *W = hsep_at(self, self->W), *target = hsep_at(self, self->target);
-    const hsep_int *begins = newton_begins(self);
-    hsep_real *v = hsep_planner_linear(planner);
-    hsep_real *P = hsep_planner_quadratic(planner) + (first * m - first * (first - 1) / 2);
-    for (hsep_int i = first; i < end; i++) {
+    hsep_real *v = hsep_planner_linear(planner), *P = hsep_planner_quadratic(planner);
+    for (hsep_int i = 0; i < m; i++) {
         for (hsep_int j = i; j < m; j += 4) {
             const hsep_int count = hsep_min(m - j, 4);
             const hsep_real *rights[4];
@@ -205,7 +202,6 @@ static void newton_products(hsep_newton *self, hsep_planner *planner)
         }
         v[i] = hsep_dot(W + i * preview + begins[i], target + begins[i], preview - begins[i]);
     }
-    self->spline = end;
 }
 
 /* Splines of each distance of knots, and what they give with the physics model alone. */
@@ -231,9 +227,7 @@ static void newton_shape_all(hsep_newton *self, hsep_planner *plans, const hsep_
             hsep_at(self, self->W)[i * preview + k] = weight[k] * change.passed[k - begin];
         }
     }
-    while (self->spline < self->m) {
-        newton_products(self, plans);
-    }
+    newton_products(self, plans);
     hsep_copy(hsep_at(self, self->gram), hsep_planner_quadratic(plans), (hsep_int)hsep_triangle(self->m));
 }
 
@@ -367,24 +361,46 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
-/* What parts of a plan count as, relative to some rows of a programme, or some samples that are predicted without
- * variances: what passes through the model or the solver once, for all samples of a plan, counts as this, */
-#define NEWTON_PASS 4
-/* columns abreast that begin with the plan, with several experts, as that, and HSEP_NEWTON_VARIED variances as */
-#define NEWTON_COLUMNS 3
+/* Predict the plan, without variances. */
+static void newton_predict(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[])
+{
+    newton_command(self, task, c, HSEP_N_DECIDED + self->n);
+    hsep_averaged_predict(
+        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), hsep_at(self, self->e_h),
+        self->late + self->preview, 0);
+}
+
+/* Predict the next samples of the plan with variances, one for each sample in the window, and one for some behind it;
+ * the first ones with its commands. */
+static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[])
+{
+    const hsep_int first = self->samples, all = self->late + self->preview, window = self->late + self->Np;
+    const hsep_int apart = first < window ? 1 : HSEP_NEWTON_APART; /* as hsep_averaged_go_on has it */
+    self->samples = hsep_min(first + apart * HSEP_NEWTON_VARIED, apart == 1 ? window : all);
+    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    if (first == 0) {
+        newton_command(self, task, c, HSEP_N_DECIDED + self->n);
+        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, self->samples, apart);
+    } else {
+        hsep_averaged_go_on(task->model, x_pb, e_h, first, self->samples, apart);
+    }
+}
+
+/* What parts of a plan count as: HSEP_NEWTON_VARIED variances, what passes through the model or the solver once, for
+ * all samples of a plan, columns abreast with several experts, and a prediction of a plan. */
 #define NEWTON_VARIANCES 2
+#define NEWTON_PASS 4
+#define NEWTON_COLUMNS 3
+#define NEWTON_PREDICTION 8
 
 /* Parts into which a count is cut, each of at most so many. */
 static hsep_int newton_parts(hsep_int count, hsep_int most) { return (count + most - 1) / most; }
 
-/* What a part of a solver's step counts as, most of which is a factor, */
-static hsep_int newton_of_solver(const hsep_newton *self) { return 1 + self->m / 20; }
+/* What a step of the solver counts as, half of which, or more, is a factor, */
+static hsep_int newton_of_step(const hsep_newton *self) { return 2 + self->m / 11; }
 
-/* a solution of a programme in so many steps, with its beginning and the residuals at its end, */
-static hsep_int newton_of_solution(const hsep_newton *self, hsep_int steps)
-{
-    return NEWTON_PASS + newton_of_solver(self) * (HSEP_INTERIOR_PARTS * steps + 1);
-}
+/* the programme of a Newton step, */
+static hsep_int newton_of_products(const hsep_newton *self) { return 1 + self->m / 11; }
 
 /* and columns abreast from one on. */
 static hsep_int newton_of_columns(hsep_newton *self, hsep_int first)
@@ -392,7 +408,7 @@ static hsep_int newton_of_columns(hsep_newton *self, hsep_int first)
     return newton_parts(NEWTON_COLUMNS * (self->preview - newton_begins(self)[first]), self->preview);
 }
 
-/* What the parts of the longest plan count as, samples of whose window are predicted already. A second length of a
+/* What all parts of the longest plan count as, samples of whose window are predicted already. A second length of a
  * Newton step, rarely tried, adds a prediction. */
 static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, hsep_int predicted)
 {
@@ -400,33 +416,13 @@ static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, h
     const hsep_int variances = newton_parts(window - predicted, HSEP_NEWTON_VARIED) +
                                newton_parts(behind, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) +
                                newton_parts(window, HSEP_NEWTON_VARIED);
-    hsep_int columns = 0;
+    const hsep_int of_physics = NEWTON_PASS + newton_of_step(self) * HSEP_NEWTON_PHYSICS_STEPS + NEWTON_PREDICTION;
+    hsep_int step =
+        2 * NEWTON_PASS + newton_of_products(self) + newton_of_step(self) * newton_tolerance.steps + NEWTON_PREDICTION;
     for (hsep_int i = 0; i < self->m; i += newton_together(planner, i)) {
-        columns += newton_of_columns(self, i);
+        step += newton_of_columns(self, i);
     }
-    const hsep_int prediction = NEWTON_PASS + HSEP_NEWTON_PREDICTED;
-    const hsep_int step = NEWTON_PASS + columns + newton_parts(self->m, HSEP_NEWTON_PRODUCTS) +
-                          newton_of_solution(self, newton_tolerance.steps) + prediction;
-    return NEWTON_VARIANCES * (variances + 1) + newton_of_solution(self, HSEP_NEWTON_PHYSICS_STEPS) +
-           self->n_steps * step + prediction + NEWTON_PASS;
-}
-
-/* Predict the next part of the samples under a plan, with its commands the first ones. varies: with variances, one for
- * each sample in the window, and one for some behind it. */
-static void newton_predict(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[], int varies)
-{
-    const hsep_int first = self->samples, all = self->late + self->preview, window = self->late + self->Np;
-    const hsep_int apart = !varies ? 0 : first < window ? 1 : HSEP_NEWTON_APART; /* as hsep_averaged_go_on has it */
-    const hsep_int most = varies ? apart * HSEP_NEWTON_VARIED : newton_parts(all, HSEP_NEWTON_PREDICTED);
-    const hsep_int count = hsep_min((apart == 1 ? window : all) - first, most);
-    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
-    if (first == 0) {
-        newton_command(self, task, c, HSEP_N_DECIDED + self->n);
-        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, count, apart);
-    } else {
-        hsep_averaged_go_on(task->model, x_pb, e_h, first, first + count, apart);
-    }
-    self->samples += count;
+    return NEWTON_VARIANCES * (variances + 1) + of_physics + self->n_steps * step + NEWTON_PASS;
 }
 
 /* Cut a plan: what follows counts as so much, and is done when newton_go_on is called again; where: another one for
@@ -441,24 +437,23 @@ static void newton_predict(hsep_newton *self, const hsep_newton_task *task, cons
     case (where):; \
     } while (0)
 
-/* Predict more samples under a plan, up to one. */
-#define NEWTON_PREDICT(where, end, c, varies) \
+/* Predict more samples of the plan with variances, up to one. */
+#define NEWTON_VARY(where, end) \
     while (self->samples < (end)) { \
-        NEWTON_YIELD(where, (self->samples > 0 ? 0 : NEWTON_PASS) + ((varies) ? NEWTON_VARIANCES : 1)); \
-        newton_predict(self, task, c, varies); \
+        NEWTON_YIELD(where, NEWTON_VARIANCES + (self->samples > 0 ? 0 : NEWTON_PASS)); \
+        newton_vary(self, task, c); \
     }
 
 /* Solve a programme in so many steps of its solver. */
 #define NEWTON_SOLVE(where, steps) \
     for (self->status = HSEP_PLAN_OPEN; self->status >= HSEP_PLAN_BOUNDED;) { \
-        NEWTON_YIELD(where, self->status == HSEP_PLAN_OPEN ? NEWTON_PASS : newton_of_solver(self)); \
+        NEWTON_YIELD(where, self->status == HSEP_PLAN_OPEN ? NEWTON_PASS : newton_of_step(self)); \
         newton_solve(self, task, steps); \
     }
 
 /* Make a plan, from one yield to the next. */
 static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 {
-    const hsep_int all = self->late + self->preview;
     hsep_planner *planner = task->planner;
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
     hsep_real *of_physics = hsep_at(self, self->of_physics);
@@ -468,7 +463,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         /* The remainder of the last plan, with the variances of all plans, which have a stack of their own */
         hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), self->samples);
         if (self->judges) {
-            NEWTON_PREDICT(1, all, rest, 1)
+            NEWTON_VARY(1, self->late + self->preview)
             self->cost = newton_cost(self, task, rest);
             self->doubt = newton_doubt(self, task);
         }
@@ -503,8 +498,8 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->gains = 1;
         for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
             if (!self->gains) { /* what was predicted last was no better */
-                self->samples = 0;
-                NEWTON_PREDICT(15, all, hsep_at(self, self->best), 0)
+                NEWTON_YIELD(15, NEWTON_PREDICTION);
+                newton_predict(self, task, hsep_at(self, self->best));
             }
             if (self->steps > 0) {
                 NEWTON_YIELD(16, NEWTON_VARIANCES);
@@ -522,10 +517,8 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
                 NEWTON_YIELD(8, newton_of_columns(self, self->spline));
                 newton_columns(self, task);
             }
-            for (self->spline = 0; self->spline < self->m;) {
-                NEWTON_YIELD(9, 1);
-                newton_products(self, planner);
-            }
+            NEWTON_YIELD(9, newton_of_products(self));
+            newton_products(self, planner);
             hsep_planner_complete(planner, planner->jerk_weight);
             NEWTON_SOLVE(10, newton_tolerance.steps)
             self->gains = 0;
@@ -537,16 +530,16 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
                 self->tries = 0;
             }
             while (self->tries < HSEP_NEWTON_TRIES) {
-                self->samples = 0;
-                NEWTON_PREDICT(11, all, c, 0)
+                NEWTON_YIELD(11, NEWTON_PREDICTION);
+                newton_predict(self, task, c);
                 newton_judge(self, task);
             }
         }
 
         /* The best of them and the physics model's plan */
         if (self->judges) {
-            self->samples = 0;
-            NEWTON_PREDICT(12, all, of_physics, 0)
+            NEWTON_YIELD(12, NEWTON_PREDICTION);
+            newton_predict(self, task, of_physics);
             newton_compare(self, task);
         }
 
@@ -556,7 +549,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         /* The window under the plan, and its variances */
         self->samples = 0;
         hsep_averaged_weigh(task->model, HSEP_OF_PREDICTIONS, hsep_at(self, self->e_h), 0);
-        NEWTON_PREDICT(14, self->late + self->Np, c, 1)
+        NEWTON_VARY(14, self->late + self->Np)
         break;
     default:
         break;
@@ -568,7 +561,7 @@ HSEP_API void hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, h
 {
     const hsep_int share = samples > 1 ? newton_parts(self->left, samples) : 0;
     hsep_int done = 0;
-    while (self->place != NEWTON_MADE && (samples <= 1 || done + self->next <= share)) {
+    while (self->place != NEWTON_MADE && (samples <= 1 || done == 0 || done + self->next <= share)) {
         done += self->next;
         newton_go_on(self, task);
     }

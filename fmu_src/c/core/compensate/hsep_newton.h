@@ -18,11 +18,9 @@
 #include "hsep_predictor.h"
 #include "hsep_averaged_model.h"
 
-#define HSEP_NEWTON_TRIES 2     /* lengths of the last Newton step that are tried, */
-#define HSEP_NEWTON_VARIED 4    /* variances that are computed in a part, */
-#define HSEP_NEWTON_PRODUCTS 8  /* rows of a programme that are, */
-#define HSEP_NEWTON_PREDICTED 4 /* and parts of a prediction without variances */
-#define HSEP_NEWTON_SHAPES 28   /* spacings of splines with knots 1, 2 and 4 of them apart: 4 each time */
+#define HSEP_NEWTON_TRIES 2   /* lengths of the last Newton step that are tried, */
+#define HSEP_NEWTON_VARIED 4  /* variances that are computed in a part */
+#define HSEP_NEWTON_SHAPES 28 /* spacings of splines with knots 1, 2 and 4 of them apart: 4 each time */
 
 typedef struct {
     hsep_int preview, Np;
