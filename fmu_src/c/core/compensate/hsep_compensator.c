@@ -189,10 +189,10 @@ static void compensator_solve(hsep_compensator *self)
         const hsep_newton_task task = compensator_task(self);
         hsep_newton_run(hsep_compensator_newton(self), &task, left);
         self->state = done ? hsep_compensator_newton(self)->planned : self->state;
-    } else { /* the solver's steps, all that are left of them in the last sample */
-        const hsep_int due = left > 0 ? (HSEP_QP_STEPS + pinned - 1) / pinned : (hsep_int)-1;
+    } else { /* halves of the solver's steps, all that are left of them in the last sample */
+        const hsep_int due = left > 0 ? 2 * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
         done = 0;
-        for (hsep_int step = 0; !done && step < due; step++) {
+        for (hsep_int half = 0; !done && half < due; half++) {
             done = hsep_planner_advance(hsep_compensator_planner(self));
         }
         if (done) {

@@ -268,7 +268,7 @@ HSEP_API void hsep_interior_begin(
 {
     self->knots = *knots;
     self->tolerance = *tolerance;
-    self->steps = 0;
+    self->steps = self->half = 0;
     interior_arrays a = interior_open(self, splines);
     self->cost = cost / (hsep_real)a.slacks.n;
     self->beyond = tolerance->margin;
@@ -308,15 +308,18 @@ HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *spli
 {
     const interior_arrays a = interior_open(self, splines);
     const slacks it = a.slacks;
-    if (self->solved || interior_factor(&a, P)) {
-        return 1;
-    }
-    /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
-    interior_direction(&a);
-    const hsep_real mu = self->mu, ratio = slacks_predicted(&it) / mu; /* mu_aff / mu; sigma = ratio^3 */
-    const hsep_real centre = hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost);
-    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* with the curvature ds dz that the predictor shows */
-        AT(r_c) = (centre - AT(s) * AT(z) - AT(ds) * AT(dz)) * AT(inverse);
+    self->half = !self->half;
+    if (self->half) { /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
+        if (self->solved || interior_factor(&a, P)) {
+            return 1;
+        }
+        interior_direction(&a);
+        const hsep_real mu = self->mu, ratio = slacks_predicted(&it) / mu; /* mu_aff / mu; sigma = ratio^3 */
+        const hsep_real centre = hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost);
+        for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* with the curvature ds dz that the predictor shows */
+            AT(r_c) = (centre - AT(s) * AT(z) - AT(ds) * AT(dz)) * AT(inverse);
+        }
+        return 0;
     }
     interior_direction(&a);
     hsep_axpy(a.problem.x, slacks_move(&it), a.dx, a.n);

@@ -23,6 +23,7 @@ typedef struct {
     hsep_tolerance tolerance;
     hsep_knots knots; /* of x, (m,); the splines before them are fixed */
     hsep_int steps;   /* done for this plan */
+    hsep_int half;    /* whether half of another one is */
     hsep_int solved;  /* whether x is the solution */
     hsep_real mu;     /* m2, at x */
     hsep_real cost;   /* m2, scale of the cost per bound */
@@ -30,7 +31,7 @@ typedef struct {
     hsep_real beyond; /* shares, by how much inner exceeds the worst bound; the margin: there is none */
     /* followed by arrays, see interior_lay_out */
 } hsep_interior;
-HSEP_ASSERT_WORDS(hsep_interior, 20);
+HSEP_ASSERT_WORDS(hsep_interior, 21);
 
 HSEP_API hsep_real hsep_interior_size(hsep_int preview, hsep_int n); /* bytes of the block, counted as a number */
 

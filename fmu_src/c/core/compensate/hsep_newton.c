@@ -361,46 +361,21 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
-/* Predict the plan, without variances. */
-static void newton_predict(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[])
-{
-    newton_command(self, task, c, HSEP_N_DECIDED + self->n);
-    hsep_averaged_predict(
-        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), hsep_at(self, self->e_h),
-        self->late + self->preview, 0);
-}
-
-/* Predict the next samples of the plan with variances, one for each sample in the window, and one for some behind it;
- * the first ones with its commands. */
-static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[])
-{
-    const hsep_int first = self->samples, all = self->late + self->preview, window = self->late + self->Np;
-    const hsep_int apart = first < window ? 1 : HSEP_NEWTON_APART; /* as hsep_averaged_go_on has it */
-    self->samples = hsep_min(first + apart * HSEP_NEWTON_VARIED, apart == 1 ? window : all);
-    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
-    if (first == 0) {
-        newton_command(self, task, c, HSEP_N_DECIDED + self->n);
-        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, self->samples, apart);
-    } else {
-        hsep_averaged_go_on(task->model, x_pb, e_h, first, self->samples, apart);
-    }
-}
-
 /* What parts of a plan count as: HSEP_NEWTON_VARIED variances, what passes through the model or the solver once, for
- * all samples of a plan, columns abreast with several experts, and a prediction of a plan. */
-#define NEWTON_VARIANCES 2
-#define NEWTON_PASS 4
-#define NEWTON_COLUMNS 3
-#define NEWTON_PREDICTION 8
+ * all samples of a plan, columns abreast with several experts, and half a prediction of a plan. */
+#define NEWTON_VARIANCES 4
+#define NEWTON_PASS 8
+#define NEWTON_COLUMNS 6
+#define NEWTON_PREDICTION 9
 
 /* Parts into which a count is cut, each of at most so many. */
 static hsep_int newton_parts(hsep_int count, hsep_int most) { return (count + most - 1) / most; }
 
-/* What a step of the solver counts as, half of which, or more, is a factor, */
-static hsep_int newton_of_step(const hsep_newton *self) { return 2 + self->m / 11; }
+/* What half a step of the solver counts as, */
+static hsep_int newton_of_half(const hsep_newton *self) { return self->m / 7; }
 
 /* the programme of a Newton step, */
-static hsep_int newton_of_products(const hsep_newton *self) { return 1 + self->m / 11; }
+static hsep_int newton_of_products(const hsep_newton *self) { return self->m / 4; }
 
 /* and columns abreast from one on. */
 static hsep_int newton_of_columns(hsep_newton *self, hsep_int first)
@@ -416,13 +391,36 @@ static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, h
     const hsep_int variances = newton_parts(window - predicted, HSEP_NEWTON_VARIED) +
                                newton_parts(behind, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) +
                                newton_parts(window, HSEP_NEWTON_VARIED);
-    const hsep_int of_physics = NEWTON_PASS + newton_of_step(self) * HSEP_NEWTON_PHYSICS_STEPS + NEWTON_PREDICTION;
-    hsep_int step =
-        2 * NEWTON_PASS + newton_of_products(self) + newton_of_step(self) * newton_tolerance.steps + NEWTON_PREDICTION;
+    const hsep_int of_physics =
+        NEWTON_PASS + 2 * newton_of_half(self) * HSEP_NEWTON_PHYSICS_STEPS + 2 * NEWTON_PREDICTION;
+    hsep_int step = 2 * NEWTON_PASS + newton_of_products(self) + 2 * newton_of_half(self) * newton_tolerance.steps +
+                    2 * NEWTON_PREDICTION;
     for (hsep_int i = 0; i < self->m; i += newton_together(planner, i)) {
         step += newton_of_columns(self, i);
     }
     return NEWTON_VARIANCES * (variances + 1) + of_physics + self->n_steps * step + NEWTON_PASS;
+}
+
+/* Predict more samples under a plan, up to one; the first ones with its commands. apart: as hsep_averaged_go_on's. */
+static void newton_predict(
+    hsep_newton *self, const hsep_newton_task *task, const hsep_real c[], hsep_int last, hsep_int apart)
+{
+    hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
+    if (self->samples == 0) {
+        newton_command(self, task, c, HSEP_N_DECIDED + self->n);
+        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, last, apart);
+    } else {
+        hsep_averaged_go_on(task->model, x_pb, e_h, self->samples, last, apart);
+    }
+    self->samples = last;
+}
+
+/* Predict the next ones with variances, one for each sample in the window, and one for some behind it. */
+static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[])
+{
+    const hsep_int window = self->late + self->Np, apart = self->samples < window ? 1 : HSEP_NEWTON_APART;
+    const hsep_int end = apart == 1 ? window : self->late + self->preview;
+    newton_predict(self, task, c, hsep_min(self->samples + apart * HSEP_NEWTON_VARIED, end), apart);
 }
 
 /* Cut a plan: what follows counts as so much, and is done when newton_go_on is called again; where: another one for
@@ -437,6 +435,14 @@ static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, h
     case (where):; \
     } while (0)
 
+/* Predict a plan without variances. */
+#define NEWTON_PREDICT(where, then, c) \
+    self->samples = 0; \
+    NEWTON_YIELD(where, NEWTON_PREDICTION); \
+    newton_predict(self, task, c, all / 8, 0); \
+    NEWTON_YIELD(then, NEWTON_PREDICTION); \
+    newton_predict(self, task, c, all, 0)
+
 /* Predict more samples of the plan with variances, up to one. */
 #define NEWTON_VARY(where, end) \
     while (self->samples < (end)) { \
@@ -447,13 +453,14 @@ static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, h
 /* Solve a programme in so many steps of its solver. */
 #define NEWTON_SOLVE(where, steps) \
     for (self->status = HSEP_PLAN_OPEN; self->status >= HSEP_PLAN_BOUNDED;) { \
-        NEWTON_YIELD(where, self->status == HSEP_PLAN_OPEN ? NEWTON_PASS : newton_of_step(self)); \
+        NEWTON_YIELD(where, self->status == HSEP_PLAN_OPEN ? NEWTON_PASS : newton_of_half(self)); \
         newton_solve(self, task, steps); \
     }
 
 /* Make a plan, from one yield to the next. */
 static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 {
+    const hsep_int all = self->late + self->preview;
     hsep_planner *planner = task->planner;
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
     hsep_real *of_physics = hsep_at(self, self->of_physics);
@@ -463,7 +470,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         /* The remainder of the last plan, with the variances of all plans, which have a stack of their own */
         hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), self->samples);
         if (self->judges) {
-            NEWTON_VARY(1, self->late + self->preview)
+            NEWTON_VARY(1, all)
             self->cost = newton_cost(self, task, rest);
             self->doubt = newton_doubt(self, task);
         }
@@ -498,8 +505,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->gains = 1;
         for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
             if (!self->gains) { /* what was predicted last was no better */
-                NEWTON_YIELD(15, NEWTON_PREDICTION);
-                newton_predict(self, task, hsep_at(self, self->best));
+                NEWTON_PREDICT(15, 17, hsep_at(self, self->best));
             }
             if (self->steps > 0) {
                 NEWTON_YIELD(16, NEWTON_VARIANCES);
@@ -530,16 +536,14 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
                 self->tries = 0;
             }
             while (self->tries < HSEP_NEWTON_TRIES) {
-                NEWTON_YIELD(11, NEWTON_PREDICTION);
-                newton_predict(self, task, c);
+                NEWTON_PREDICT(11, 18, c);
                 newton_judge(self, task);
             }
         }
 
         /* The best of them and the physics model's plan */
         if (self->judges) {
-            NEWTON_YIELD(12, NEWTON_PREDICTION);
-            newton_predict(self, task, of_physics);
+            NEWTON_PREDICT(12, 19, of_physics);
             newton_compare(self, task);
         }
 
