@@ -1,6 +1,7 @@
 #include "hsep_newton.h"
 
 #include "hsep_cholesky.h"
+#include "hsep_linearised.h"
 
 static const hsep_real newton_lengths[] = {HSEP_NEWTON_LENGTHS};
 static const hsep_tolerance newton_tolerance = {HSEP_NEWTON_TOLERANCE};

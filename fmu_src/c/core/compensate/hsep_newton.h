@@ -12,7 +12,6 @@
 #ifndef HSEP_NEWTON_H
 #define HSEP_NEWTON_H
 
-#include "hsep_linearised.h"
 #include "hsep_physics.h"
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
