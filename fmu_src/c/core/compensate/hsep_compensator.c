@@ -211,7 +211,7 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     compensator_target(self, state);
     const hsep_real *spline =
         state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
-    hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
+    hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d), 0, 1.0);
     hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
     const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact);
     self->state = (hsep_int)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);

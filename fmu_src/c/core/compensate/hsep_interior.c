@@ -126,7 +126,6 @@ typedef struct {
     hsep_int first, n; /* the first spline that is not fixed; entries of x, as many as there are knots */
     hsep_problem problem;
     hsep_real *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
-    hsep_real *factor;   /* triangle of n rows */
     slacks slacks;
 } interior_arrays;
 
@@ -154,7 +153,7 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n
     for (int i = 0; i < 8; i++) {
         *of_bounds[i] = interior_take(block, &end, 2.0 * rows);
     }
-    a->factor = interior_take(block, &end, hsep_triangle(n));
+    a->problem.factor = interior_take(block, &end, hsep_triangle(n));
     a->problem.c = interior_take(block, &end, columns + 2.0 * HSEP_KNOTS_NEAR);
     a->problem.products = interior_take(block, &end, HSEP_KNOTS_WIDTH * columns);
     return end * sizeof(hsep_real);
@@ -242,7 +241,7 @@ static void interior_direction(const interior_arrays *a)
     slacks_give_rows(&it, it.ds, -1.0);
     hsep_copy(a->dx, a->r_d, a->n);
     interior_transpose(a, a->dx);
-    hsep_cholesky_solve(a->factor, a->n, a->dx);
+    hsep_cholesky_solve(a->problem.factor, a->n, a->dx);
     interior_rows(a, a->dx);
 }
 
@@ -294,14 +293,14 @@ HSEP_API void hsep_interior_begin(
 static int interior_factor(const interior_arrays *a, const hsep_real P[])
 {
     const slacks it = a->slacks;
-    hsep_copy(a->factor, P, (hsep_int)hsep_triangle(a->n));
+    hsep_copy(a->problem.factor, P, (hsep_int)hsep_triangle(a->n));
     for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* the weights W */
         AT(ds) = AT(z) * AT(inverse);
     }
     slacks_give_rows(&it, it.ds, 1.0);
     hsep_splines_gram(a->splines, a->slacks.rows, a->first, a->problem.products, a->slacks.work);
-    hsep_knots_add(a->knots, a->problem.products, a->factor, a->problem.c);
-    return !hsep_cholesky_rows(a->factor, a->n, 0, a->n, NULL);
+    hsep_knots_add(a->knots, a->problem.products, a->problem.factor, a->problem.c);
+    return !hsep_cholesky_rows(a->problem.factor, a->n, 0, a->n, NULL);
 }
 
 HSEP_API int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])

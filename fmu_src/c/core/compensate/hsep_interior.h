@@ -42,7 +42,8 @@ typedef struct {
     hsep_real *inner;      /* (n,) m, result: the iterate farthest inside the bounds without their margin, or NULL */
     hsep_real *low, *high; /* (4 preview,), in shares */
     hsep_real *c;          /* (n + 2 HSEP_KNOTS_NEAR,) work, before and behind it, */
-    hsep_real *products;   /* (n, HSEP_KNOTS_WIDTH) and for products of splines */
+    hsep_real *products;   /* (n, HSEP_KNOTS_WIDTH) for products of splines, */
+    hsep_real *factor;     /* and for a triangle of n rows */
 } hsep_problem;
 
 HSEP_API hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines);

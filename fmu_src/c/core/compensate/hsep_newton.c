@@ -127,10 +127,8 @@ static void newton_open(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *weight = hsep_at(self, self->weight);
     hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
-    hsep_planner_open(task->planner, task->x_d);
-    if (self->is_physics) {
-        hsep_planner_may_turn(task->planner);
-    }
+    const hsep_real change = hsep_averaged_doubts(task->model) ? 1.0 : self->bound;
+    hsep_planner_open(task->planner, task->x_d, self->is_physics > 0, change);
     for (hsep_int k = 0; k < self->preview; k++) {
         target[k] = weight[k] * weight[k] * (task->x_d[k] - task->predictor->start - x_pb[self->preview - 1 - k]);
     }
@@ -499,22 +497,15 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         }
 
         /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
-        if (self->follows) {
-            newton_copy(self, hsep_at(self, self->best), rest);
-            newton_copy(self, c, rest);
-        }
+        newton_copy(self, hsep_at(self, self->best), rest);
         self->gains = 1;
         for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
             if (!self->gains) { /* what was predicted last was no better */
                 NEWTON_PREDICT(15, 17, hsep_at(self, self->best));
             }
-            if (self->steps > 0) {
-                NEWTON_YIELD(16, NEWTON_VARIANCES);
-                newton_copy(self, c, hsep_at(self, self->best));
-                hsep_planner_open(planner, task->x_d);
-            }
-            hsep_planner_may_turn(planner); /* the model follows the friction */
-            planner->change = self->bound;
+            NEWTON_YIELD(16, NEWTON_VARIANCES);
+            newton_copy(self, c, hsep_at(self, self->best));
+            hsep_planner_open(planner, task->x_d, 1, self->bound); /* the model follows the friction */
             NEWTON_YIELD(7, NEWTON_PASS);
             (void)newton_errors(self, task);
             hsep_linearised_at(
@@ -591,7 +582,6 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
         path[self->preview - 1 - k] = task->x_d[k] - task->predictor->start;
     }
     self->bound = newton_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
-    task->planner->change = hsep_averaged_doubts(task->model) ? 1.0 : self->bound;
     newton_command(self, task, rest, HSEP_N_DECIDED + self->n);
     const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->samples = self->late + (pinned > 0 ? pinned : 1);
