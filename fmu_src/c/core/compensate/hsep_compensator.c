@@ -1,7 +1,5 @@
 #include "hsep_compensator.h"
 
-static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};
-
 HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_predictor_parameters *parameters)
 {
     const hsep_real preview = (hsep_real)parameters->preview, horizon = (hsep_real)parameters->horizon;
@@ -213,7 +211,7 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
         state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
     hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d), 0, 1.0);
     hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
-    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact);
+    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), HSEP_QP_STEPS);
     self->state = (hsep_int)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }
@@ -237,7 +235,7 @@ static int compensator_plan(hsep_compensator *self)
         status = compensator_try(self, HSEP_SEP_PHYSICS);
     } else if (self->compensate == HSEP_SEP_OFF && before != HSEP_SEP_OFF) {
         hsep_planner_end(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
-        status = hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact);
+        status = hsep_planner_solve(hsep_compensator_planner(self), HSEP_QP_STEPS);
     }
     predictor->n_physics = self->state == HSEP_SEP_HYBRID ? 0 : predictor->Np;
     return status == HSEP_PLAN_BOUNDED;

@@ -4,7 +4,6 @@
 #include "hsep_linearised.h"
 
 static const hsep_real newton_lengths[] = {HSEP_NEWTON_LENGTHS};
-static const hsep_tolerance newton_tolerance = {HSEP_NEWTON_TOLERANCE};
 
 HSEP_ASSERT(lengths, sizeof newton_lengths == HSEP_NEWTON_TRIES * sizeof(hsep_real));
 
@@ -246,25 +245,6 @@ HSEP_API void hsep_newton_init(
     newton_shape_all(self, plans, spline);
 }
 
-/* Steps of the solver for the physics model's plan, and for a Newton step. */
-static hsep_int newton_physics_steps(const hsep_newton *self)
-{
-    return self->follows ? HSEP_NEWTON_PHYSICS_STEPS : newton_tolerance.steps;
-}
-
-/* Do a part of the solution of a programme in so many steps: its factor and whether bounds allow it; the solver's. */
-static void newton_solve(hsep_newton *self, const hsep_newton_task *task, hsep_int steps)
-{
-    hsep_tolerance tolerance = newton_tolerance;
-    tolerance.steps = steps;
-#ifdef HSEP_FLOAT32
-    tolerance.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
-#endif
-    self->status = self->status == HSEP_PLAN_OPEN        ? hsep_planner_solve(task->planner, &tolerance)
-                   : hsep_planner_advance(task->planner) ? HSEP_PLAN_DONE
-                                                         : HSEP_PLAN_BOUNDED;
-}
-
 /* Half of the change of velocity that the slope of the next Newton step is taken over: a share of what this one changes
  * the best plan, or would, RMS, relative to the model's scale. */
 static hsep_real newton_next_reach(hsep_newton *self, const hsep_newton_task *task)
@@ -392,8 +372,8 @@ static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, h
                                newton_parts(window, HSEP_NEWTON_VARIED);
     const hsep_int of_physics =
         NEWTON_PASS + 2 * newton_of_half(self) * HSEP_NEWTON_PHYSICS_STEPS + 2 * NEWTON_PREDICTION;
-    hsep_int step = 2 * NEWTON_PASS + newton_of_products(self) + 2 * newton_of_half(self) * newton_tolerance.steps +
-                    2 * NEWTON_PREDICTION;
+    hsep_int step =
+        2 * NEWTON_PASS + newton_of_products(self) + 2 * newton_of_half(self) * planner->steps + 2 * NEWTON_PREDICTION;
     for (hsep_int i = 0; i < self->m; i += newton_together(planner, i)) {
         step += newton_of_columns(self, i);
     }
@@ -453,7 +433,9 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
 #define NEWTON_SOLVE(where, steps) \
     for (self->status = HSEP_PLAN_OPEN; self->status >= HSEP_PLAN_BOUNDED;) { \
         NEWTON_YIELD(where, self->status == HSEP_PLAN_OPEN ? NEWTON_PASS : newton_of_half(self)); \
-        newton_solve(self, task, steps); \
+        self->status = self->status == HSEP_PLAN_OPEN  ? hsep_planner_solve(planner, steps) \
+                       : hsep_planner_advance(planner) ? HSEP_PLAN_DONE \
+                                                       : HSEP_PLAN_BOUNDED; \
     }
 
 /* Make a plan, from one yield to the next. */
@@ -479,7 +461,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         if (self->planned) {
             NEWTON_YIELD(2, NEWTON_VARIANCES);
             newton_open(self, task);
-            NEWTON_SOLVE(3, newton_physics_steps(self))
+            NEWTON_SOLVE(3, self->follows ? HSEP_NEWTON_PHYSICS_STEPS : planner->steps)
             self->planned = self->status == HSEP_PLAN_DONE;
         }
         newton_copy(self, of_physics, c);
@@ -493,7 +475,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
             newton_copy(self, c, rest);
             NEWTON_YIELD(4, NEWTON_VARIANCES);
             hsep_planner_end(planner, task->x_d);
-            NEWTON_SOLVE(5, newton_tolerance.steps)
+            NEWTON_SOLVE(5, planner->steps)
         }
 
         /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
@@ -518,7 +500,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
             NEWTON_YIELD(9, newton_of_products(self));
             newton_products(self, planner);
             hsep_planner_complete(planner, planner->jerk_weight);
-            NEWTON_SOLVE(10, newton_tolerance.steps)
+            NEWTON_SOLVE(10, planner->steps)
             self->gains = 0;
             self->tries = HSEP_NEWTON_TRIES;
             if (self->status != HSEP_PLAN_FAILED) {

@@ -1,6 +1,7 @@
 #include "hsep_planner.h"
 
 #include "hsep_cholesky.h"
+#include "hsep_interior.h"
 
 /* Stops of plans that are longer than the preview: behind the preview a plan takes the command to go on at its last
  * velocity. What comes may be another command, so each plan has a stop beside it: it shares the splines that are
@@ -21,6 +22,25 @@ typedef struct {
     hsep_int start, way, own_rows; /* the last stop without its own part, the way to the plan's, and that part */
 } hsep_stop;
 HSEP_ASSERT_WORDS(hsep_stop, 13);
+
+/* Where the solver ends. */
+static hsep_tolerance planner_tolerance(hsep_int averaging)
+{
+    static const hsep_tolerance exact = {HSEP_QP_EXACT};
+    hsep_tolerance averaged = {HSEP_NEWTON_TOLERANCE};
+#ifdef HSEP_FLOAT32
+    averaged.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
+#endif
+    return averaging ? averaged : exact;
+}
+
+/* Where its programme is; x: the change that was found last. */
+static hsep_problem planner_problem(hsep_planner *self)
+{
+    return hsep_interior_problem(hsep_part(self, self->interior), hsep_planner_splines(self));
+}
+
+HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self) { return planner_problem(self).v; }
 
 /* Splines that a bounded plan leaves as they are. */
 static hsep_int planner_n_pinned(const hsep_predictor_parameters *parameters)
@@ -64,6 +84,8 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_predictor
     self->Np = parameters->settings.Np;
     self->n_pinned = planner_n_pinned(parameters);
     self->no_reversal = parameters->compensator.no_reversal;
+    self->averaging = parameters->averaging.averaging;
+    self->steps = planner_tolerance(self->averaging).steps;
     self->knots = hsep_planner_knots(parameters);
     self->jerk_weight = parameters->compensator.jerk_weight;
     self->c = hsep_take(&end, HSEP_N_DECIDED + (hsep_real)n);
@@ -229,7 +251,7 @@ static hsep_int planner_first(const hsep_planner *self) { return hsep_planner_sp
 /* Rows of splines x, (m,), of this cost. */
 static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows[])
 {
-    hsep_real *c = hsep_planner_problem(self).c;
+    hsep_real *c = planner_problem(self).c;
     hsep_knots_widen(&self->solved, x, c);
     hsep_splines_rows(hsep_planner_splines(self), c, planner_first(self), rows);
 }
@@ -238,7 +260,7 @@ HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int n = self->solved.m;
-    const hsep_problem problem = hsep_planner_problem(self);
+    const hsep_problem problem = planner_problem(self);
     const hsep_real *third = hsep_at(self, self->third);
     hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0;
     hsep_splines_jerk(splines, jerk_weight, third, planner_first(self), problem.products, problem.c);
@@ -287,7 +309,7 @@ static void planner_pin(hsep_planner *self)
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_problem problem = hsep_planner_problem(self);
+    const hsep_problem problem = planner_problem(self);
     const hsep_real *b = hsep_splines_shape(splines);
     const hsep_int spacing = splines->spacing, width = 4 * spacing, first = self->n_pinned, n = splines->n - first;
     hsep_real *P = hsep_planner_quadratic(self), *delta = problem.low;
@@ -321,38 +343,40 @@ static void planner_start(hsep_planner *self, hsep_real x[])
 
 /* Begin a bounded plan at this cost, from the remainder of the last plan. The pinned samples stay as they are, and its
  * bounds are what they leave. cost: as hsep_interior_begin has it. */
-static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_tolerance *tolerance)
+static void planner_bound(hsep_planner *self, hsep_real cost, hsep_int steps)
 {
+    hsep_tolerance tolerance = planner_tolerance(self->averaging);
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int preview = splines->preview;
     const hsep_real *total = hsep_at(self, self->total);
     const hsep_real *least = hsep_at(self, self->low), *most = hsep_at(self, self->high);
-    const hsep_problem problem = hsep_planner_problem(self);
+    const hsep_problem problem = planner_problem(self);
     hsep_real *low = problem.low, *high = problem.high;
     planner_start(self, problem.x);
     planner_rows(self, problem.x, low);
     for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
         const hsep_real other = total[r] - low[r];
-        low[r] = least[r] - other + tolerance->margin;
-        high[r] = most[r] - other - tolerance->margin;
+        low[r] = least[r] - other + tolerance.margin;
+        high[r] = most[r] - other - tolerance.margin;
     }
+    tolerance.steps = steps;
     hsep_interior_begin(
-        hsep_part(self, self->interior), splines, &self->solved, hsep_planner_quadratic(self), cost, tolerance);
+        hsep_part(self, self->interior), splines, &self->solved, hsep_planner_quadratic(self), cost, &tolerance);
 }
 
 /* Change the remainder of the last plan by a step x, (m,), m, of this cost. */
 static void planner_take(hsep_planner *self, const hsep_real x[])
 {
-    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self), *c = hsep_planner_problem(self).c;
+    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self), *c = planner_problem(self).c;
     hsep_knots_widen(&self->solved, x, c);
     hsep_axpy(rest, 1.0, c, self->solved.n);
 }
 
-HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance)
+HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
 {
     const hsep_int n = self->solved.m;
     const hsep_real *row = hsep_planner_quadratic(self);
-    const hsep_problem problem = hsep_planner_problem(self);
+    const hsep_problem problem = planner_problem(self);
     hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low, *start = problem.high; /* work */
     hsep_copy(problem.factor, row, (hsep_int)hsep_triangle(n));
     if (!hsep_cholesky_rows(problem.factor, n, 0, n, NULL)) {
@@ -386,7 +410,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tole
     if (!self->changes) {
         planner_pin(self);
     }
-    planner_bound(self, cost, tolerance);
+    planner_bound(self, cost, steps);
     return HSEP_PLAN_BOUNDED;
 }
 
@@ -396,7 +420,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
     if (!hsep_interior_advance(hsep_part(self, self->interior), splines, hsep_planner_quadratic(self))) {
         return 0;
     }
-    const hsep_problem problem = hsep_planner_problem(self);
+    const hsep_problem problem = planner_problem(self);
     hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high, finite = 0.0;
     planner_start(self, at);
     for (hsep_int j = 0; j < self->solved.m; j++) {

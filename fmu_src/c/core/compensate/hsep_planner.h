@@ -9,7 +9,6 @@
 #ifndef HSEP_PLANNER_H
 #define HSEP_PLANNER_H
 
-#include "hsep_interior.h"
 #include "hsep_splines.h"
 #include "hsep_window.h"
 
@@ -17,7 +16,9 @@ typedef struct {
     hsep_int Np;
     hsep_int n_pinned; /* splines of a bounded plan that stay as they were */
     hsep_int no_reversal;
-    hsep_int changes; /* whether the cost is of a change of the last plan; otherwise it is of a plan */
+    hsep_int averaging; /* whether plans are of the averaged model, */
+    hsep_int steps;     /* and those of the solver at most */
+    hsep_int changes;   /* whether the cost is of a change of the last plan; otherwise it is of a plan */
     hsep_real jerk_weight;
     hsep_real delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
     hsep_int c;                               /* (3 + n,) m, coefficients */
@@ -30,18 +31,12 @@ typedef struct {
     hsep_knots solved; /* and those of this cost */
     hsep_int stop;     /* of plans that are longer than what is known; 0: none is */
 } hsep_planner;
-HSEP_ASSERT_WORDS(hsep_planner, 38);
+HSEP_ASSERT_WORDS(hsep_planner, 40);
 
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
 {
     return hsep_part_const(self, self->splines);
-}
-
-/* Where its programme is; x: the change that was found last. */
-static inline hsep_problem hsep_planner_problem(hsep_planner *self)
-{
-    return hsep_interior_problem(hsep_part(self, self->interior), hsep_planner_splines(self));
 }
 
 /* Coefficients of the plan, (3 + n,), m; until it is made, of the remainder of the last plan. */
@@ -81,7 +76,7 @@ static inline hsep_int hsep_planner_pinned(const hsep_planner *self)
  * to P with what makes it positive definite. */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], int may_turn, hsep_real change);
 static inline hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
-static inline hsep_real *hsep_planner_linear(hsep_planner *self) { return hsep_planner_problem(self).v; }
+HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight);
 
 /* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline behind it,
@@ -95,7 +90,7 @@ HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
 
 /* Plan at this cost, which is used up. The first samples (hsep_planner_pinned) stay as they are in a change of the last
  * plan, and in a bounded plan, which is solved within the tolerance. Cost: m^3 / 6 multiply-adds. */
-HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance);
+HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps);
 
 /* Do a part of a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
 HSEP_API int hsep_planner_advance(hsep_planner *self);
