@@ -40,13 +40,6 @@ typedef struct {
 } hsep_linearised;
 HSEP_ASSERT_WORDS(hsep_linearised, 18);
 
-/* A change of the commands that begins at sample 0 of the preview. */
-typedef struct {
-    hsep_real *commands; /* (n,) m, oldest first, and nothing behind them */
-    hsep_int n;
-    hsep_real *passed; /* (preview,) m, the same behind G_pb */
-} hsep_linearised_change;
-
 #define LINEARISED_DIFFERENCES 8 /* most orders of differences of x_pb, it among them */
 #define LINEARISED_GAINS 5       /* of an expert: of v_d now and before, of x now and the two samples before */
 #define LINEARISED_BEFORE 2      /* samples at rest before a change */
@@ -234,9 +227,11 @@ static void linearised_slopes(
     }
 }
 
-/* Begin to linearise a model that has learned, for a change that may begin at any sample of the preview: what does not
- * depend on the commands. Cost: p multiply-adds a sample for each expert of the command. */
-static void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model, const hsep_linearised_change *change)
+/* Begin to linearise a model that has learned, for a change of the commands that may begin at any sample of the
+ * preview: what does not depend on the commands. change: (preview,) m, oldest first, nothing behind the first n; passed:
+ * the same behind G_pb. */
+static void hsep_linearised_begin(
+    hsep_linearised *self, hsep_averaged *model, const hsep_real change[], const hsep_real passed[], hsep_int n)
 {
     const hsep_int first = linearised_first(self, model);
     const hsep_real T_s = hsep_averaged_disturbances(model)->T_s;
@@ -244,16 +239,16 @@ static void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model, c
     hsep_real *velocity = hsep_at(self, self->velocity) + LINEARISED_BEFORE;
     hsep_real *position = hsep_at(self, self->position) + LINEARISED_BEFORE;
     for (hsep_int u = 0; u < self->preview; u++) {
-        commands[1 + u] = u < change->n ? change->commands[u] : 0.0;
+        commands[1 + u] = change[u];
         velocity[u] = (commands[1 + u] - commands[u]) / T_s;
-        position[u] = change->passed[u];
+        position[u] = passed[u];
     }
-    self->moves = hsep_min(change->n + 2, self->preview);
+    self->moves = hsep_min(n + 2, self->preview);
     /* What is neither friction nor stiffness: the change behind G_pb, and as late as the experts of the command take
      * it, and their response to it */
     const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
     hsep_real *base = hsep_at(self, self->base);
-    hsep_copy(base, change->passed, self->preview);
+    hsep_copy(base, passed, self->preview);
     for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
         const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
         const hsep_real weight = linearised_weight(model, i, HSEP_COMMAND_RESIDUAL);
@@ -261,12 +256,12 @@ static void hsep_linearised_begin(hsep_linearised *self, hsep_averaged *model, c
             const hsep_int n_passed = first - 1 - HSEP_FEATURES_N_SPANS;
             const hsep_real *weights = hsep_expert_weights(expert) + 1;
             hsep_real *response = linearised_response(self, i);
-            linearised_pass(weights, n_passed, change->passed, self->preview, response);
+            linearised_pass(weights, n_passed, passed, self->preview, response);
             linearised_span(self, weights + n_passed, dead_time, response);
         } else if (weight > 0.0) {
-            linearised_of_increments(self, expert, change->n, dead_time, linearised_response(self, i));
+            linearised_of_increments(self, expert, n, dead_time, linearised_response(self, i));
             for (hsep_int u = 0; u < self->preview; u++) {
-                base[u] += weight * ((u < dead_time ? 0.0 : commands[1 + u - dead_time]) - change->passed[u]);
+                base[u] += weight * ((u < dead_time ? 0.0 : commands[1 + u - dead_time]) - passed[u]);
             }
         }
     }

@@ -32,7 +32,7 @@ HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_p
     self->weight = hsep_take(&end, preview);
     self->corrected = hsep_take(&end, (hsep_real)n);
     self->begins = hsep_take(&end, m);
-    self->shapes = hsep_take(&end, HSEP_NEWTON_SHAPES * (hsep_real)spacing);
+    self->shapes = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
     self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
     self->gram = hsep_take(&end, hsep_triangle(knots.m));
     self->W = hsep_take(&end, m * preview);
@@ -111,14 +111,15 @@ static hsep_real newton_doubt(hsep_newton *self, const hsep_newton_task *task)
 /* Samples that the splines begin with, which are solved for. */
 static hsep_int *newton_begins(hsep_newton *self) { return hsep_part(self, self->begins); }
 
-/* A spline with this distance of knots. */
-static hsep_linearised_change newton_shape(hsep_newton *self, const hsep_planner *planner, hsep_int level)
+/* A spline with this distance of knots, (preview,), and it behind G_pb, likewise. */
+static hsep_real *newton_shape(hsep_newton *self, hsep_int level)
 {
-    const hsep_int width = 4 * hsep_planner_splines(planner)->spacing;
-    return (hsep_linearised_change){
-        .commands = hsep_at(self, self->shapes) + (((hsep_int)1 << level) - 1) * width,
-        .n = width << level,
-        .passed = hsep_at(self, self->passed) + level * self->preview};
+    return hsep_at(self, self->shapes) + level * self->preview;
+}
+
+static hsep_real *newton_passed(hsep_newton *self, hsep_int level)
+{
+    return hsep_at(self, self->passed) + level * self->preview;
 }
 
 /* Begin the physics model's plan at the remainder of the last one, which was predicted last: W' W, W' error. */
@@ -133,8 +134,7 @@ static void newton_open(hsep_newton *self, const hsep_newton_task *task)
     }
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_int level = hsep_knots_at(&task->planner->knots, i).level, begin = newton_begins(self)[i];
-        const hsep_real *passed = newton_shape(self, task->planner, level).passed;
-        v[i] = hsep_dot(passed, target + begin, self->preview - begin);
+        v[i] = hsep_dot(newton_passed(self, level), target + begin, self->preview - begin);
     }
     hsep_copy(hsep_planner_quadratic(task->planner), hsep_at(self, self->gram), (hsep_int)hsep_triangle(self->m));
     hsep_planner_complete(task->planner, task->planner->jerk_weight);
@@ -157,8 +157,8 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
     const hsep_knot knot = hsep_knots_at(&task->planner->knots, first);
     const hsep_int apart = spacing << knot.level, from = newton_begins(self)[first];
     if (first == knot.first) {
-        const hsep_linearised_change change = newton_shape(self, task->planner, knot.level);
-        hsep_linearised_begin(linearised, task->model, &change);
+        hsep_linearised_begin(
+            linearised, task->model, newton_shape(self, knot.level), newton_passed(self, knot.level), 4 * apart);
     }
     for (hsep_int c = 0; c < count; c++) {
         columns[c] = hsep_at(self, self->W) + ((first + c) * self->preview + from + c * apart);
@@ -211,18 +211,16 @@ static void newton_shape_all(hsep_newton *self, hsep_planner *plans, const hsep_
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_knot knot = hsep_knots_at(&plans->knots, i);
         const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
-        const hsep_linearised_change change = newton_shape(self, plans, knot.level);
+        hsep_real *shape = newton_shape(self, knot.level), *passed = newton_passed(self, knot.level);
         newton_begins(self)[i] = begin;
-        hsep_zero(change.commands, change.n);
-        hsep_zero(change.passed, preview);
+        hsep_zero(shape, preview);
+        hsep_zero(passed, preview);
         for (hsep_int j = 0; j < knot.length; j++) {
-            hsep_axpy(change.commands + j * spacing, knot.share[j], b, 4 * spacing);
-            if (j * spacing < preview) {
-                hsep_axpy(change.passed + j * spacing, knot.share[j], spline, preview - j * spacing);
-            }
+            hsep_axpy(shape + j * spacing, knot.share[j], b, 4 * spacing);
+            hsep_axpy(passed + j * spacing, knot.share[j], spline, preview - j * spacing);
         }
         for (hsep_int k = begin; k < preview; k++) {
-            hsep_at(self, self->W)[i * preview + k] = weight[k] * change.passed[k - begin];
+            hsep_at(self, self->W)[i * preview + k] = weight[k] * passed[k - begin];
         }
     }
     newton_products(self, plans);
@@ -528,9 +526,6 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->samples = 0;
         hsep_averaged_weigh(task->model, HSEP_OF_PREDICTIONS, hsep_at(self, self->e_h), 0);
         NEWTON_VARY(14, self->late + self->Np)
-        break;
-    default:
-        break;
     }
     self->place = NEWTON_MADE;
 }
@@ -543,7 +538,7 @@ HSEP_API void hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, h
         done += self->next;
         newton_go_on(self, task);
     }
-    self->left -= done;
+    self->left -= hsep_min(done, self->left);
 }
 
 HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best)

@@ -17,9 +17,8 @@
 #include "hsep_predictor.h"
 #include "hsep_averaged_model.h"
 
-#define HSEP_NEWTON_TRIES 2   /* lengths of the last Newton step that are tried, */
-#define HSEP_NEWTON_VARIED 4  /* variances that are computed in a part */
-#define HSEP_NEWTON_SHAPES 28 /* spacings of splines with knots 1, 2 and 4 of them apart: 4 each time */
+#define HSEP_NEWTON_TRIES 2  /* lengths of the last Newton step that are tried, */
+#define HSEP_NEWTON_VARIED 4 /* variances that are computed in a part */
 
 typedef struct {
     hsep_int preview, Np;
@@ -57,7 +56,7 @@ typedef struct {
     hsep_int weight;    /* (preview,) of the errors of a plan: they count less at its end */
     hsep_int corrected; /* (n,) m, what the averaged model's last plan changed the one before by; 0 of any other */
     hsep_int begins;    /* (m,) hsep_int, samples that the splines begin with, which are solved for */
-    hsep_int shapes;    /* (HSEP_NEWTON_SHAPES spacing,) splines of each distance of knots, one after the other, */
+    hsep_int shapes;    /* (HSEP_KNOTS_LEVELS, preview) splines of each distance of knots, */
     hsep_int passed;    /* (HSEP_KNOTS_LEVELS, preview) and these behind G_pb */
     hsep_int gram;      /* triangle of m rows, W' W with G_pb alone */
     hsep_int W;         /* (m, preview) weighted changes of x_h by splines, 0 before they begin */

@@ -96,14 +96,8 @@ HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], h
         hsep_axpy(rows + order * preview + 1, -1.0, of, preview - 1);
     }
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        hsep_real *row = rows + order * preview;
-        const hsep_real share = self->share[order];
-        hsep_int k = 0;
-        for (; k + HSEP_LANES <= preview; k += HSEP_LANES) {
-            *hsep_lanes_at(row + k) *= share;
-        }
-        for (; k < preview; k++) {
-            row[k] *= share;
+        for (hsep_int k = 0; k < preview; k++) {
+            rows[order * preview + k] *= self->share[order];
         }
     }
 }
