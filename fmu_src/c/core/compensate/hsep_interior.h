@@ -1,4 +1,4 @@
-/* Primal-dual interior-point solver for a bounded plan: Mehrotra's predictor-corrector method (1992), a part of
+/* Primal-dual interior-point solver for a bounded plan: Mehrotra's predictor-corrector method (1992), half
  * a step a call:
  *  min 1/2 x' P x - v' x  with  low <= A x <= high, A being hsep_splines_rows of hsep_knots_widen.
  *
@@ -348,9 +348,8 @@ static int interior_factor(const interior_arrays *a, const hsep_real P[])
     return !hsep_cholesky_rows(a->problem.factor, a->n, 0, a->n, NULL);
 }
 
-/* Do a part of a step: its residuals, a third of its factor, its predictor or its corrector. P: as in
- * hsep_interior_begin. Returns whether the plan is solved. Cost: m^3 / 6 multiply-adds for the factor, m^2 before and
- * 2 m^2 after it, and about 900 operations and 8 divisions a sample of the plan in all. */
+/* Do half a step: its factor and its predictor, or its corrector and the residuals at its end. P: as in
+ * hsep_interior_begin. Returns whether the plan is solved. */
 static int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
 {
     const interior_arrays a = interior_open(self, splines);

@@ -269,7 +269,7 @@ static void hsep_linearised_begin(
 
 /* Linearise at commands x_d that the model was last tried with, with the response x_pb, both (n,), m, newest first.
  * reach: half of the change of velocity that the friction's slope is taken over, relative to the velocity scale; 0: the
- * tangent. Cost: 12 tanh a sample. */
+ * tangent. */
 static void hsep_linearised_at(
     hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
 {
@@ -383,8 +383,7 @@ static void linearised_add(
 }
 
 /* Changes of x_h, m, by that change of the commands where it begins at the samples first + c spacing of the preview, c
- * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). Cost: HSEP_PHYSICS_ABREAST (9 n_modes
- * + p + 21) multiply-adds a sample for each expert that predicts the residual of the physics model, and counts. */
+ * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). */
 static void hsep_linearised_columns(
     hsep_linearised *self, hsep_averaged *model, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST])

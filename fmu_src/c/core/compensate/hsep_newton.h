@@ -6,8 +6,8 @@
  * learned, the averaged model judges all plans: its own, the physics model's, and the remainder of the last one; the
  * best is taken, of its own change of the last one a share. Where compensation is off a plan ends it.
  *
- * A plan is one function in reading order, cut by yields into short parts, each of which says what it costs;
- * hsep_newton_run does as many as a sample's equal share of the work that may be left.
+ * A plan is one function in reading order, cut by yields into short parts, each of which counts as a few; the longest
+ * plan is counted, and hsep_newton_run does a sample's equal share of it.
  */
 #ifndef HSEP_NEWTON_H
 #define HSEP_NEWTON_H
@@ -78,18 +78,16 @@ typedef struct {
 HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_parameters *parameters);
 
 /* Fill the block, which is 0, with the planner that solves its plans and a spline filtered by the physics model,
- * (preview,), m/m. Cost: m^2 preview / 4 multiply-adds. */
+ * (preview,), m/m. */
 HSEP_API void hsep_newton_init(
     hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan, but only samples that the plan leaves as they are,
- * and late ones. best: best model allowed, 0 none, 1 physics, 2 averaged, which judges plans once the warm-up is over.
- * Cost: as hsep_averaged_forecast; late samples add late^2 / 2 for each expert, here and in the last part. */
+ * and late ones. best: best model allowed, 0 none, 1 physics, 2 averaged, which judges plans once the warm-up is over. */
 HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best);
 
-/* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that is left,
- * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
- * Cost of a plan: as newton_left has it; a second length of a Newton step, rarely tried, adds a prediction. */
+/* Do parts of the plan: this sample's equal share of what is left, samples being left until the plan is due; all of it
+ * in the last one, in which the plan is made and the window predicted. */
 HSEP_API void hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples);
 
 #endif

@@ -80,19 +80,18 @@ HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight);
 
 /* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline behind it,
- * (preview,); target: x_d minus its response to x_d plus the decided part of delta, (preview,) m. Cost: n preview. */
+ * (preview,); target: x_d minus its response to x_d plus the decided part of delta, (preview,) m. */
 HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
 
 /* Open a change of the last plan that ends compensation, with the cost of delta itself, and of its jerk, which makes it
- * as smooth as a short part of a plan allows. It ends where the last plan does. x_d: as hsep_planner_open has it. Cost:
- * 30 n spacing and 15 preview multiply-adds, and those of hsep_knots_add. */
+ * as smooth as a short part of a plan allows. It ends where the last plan does. x_d: as hsep_planner_open has it. */
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
 
 /* Plan at this cost, which is used up. The first samples (hsep_planner_pinned) stay as they are in a change of the last
- * plan, and in a bounded plan, which is solved within the tolerance. Cost: m^3 / 6 multiply-adds. */
+ * plan, and in a bounded plan, which is solved within the tolerance. */
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps);
 
-/* Do a part of a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
+/* Do half a step of a bounded plan; return whether the plan is made. */
 HSEP_API int hsep_planner_advance(hsep_planner *self);
 
 /* Cost of the jerk of a plan, m2, work: (preview,). */

@@ -96,7 +96,7 @@ static inline hsep_real hsep_splines_lay_out(hsep_splines *self, hsep_int previe
     return end * sizeof(hsep_real);
 }
 
-/* Another limit of an order from now on, m a sample to that power. Cost: 10 spacing operations. */
+/* Another limit of an order from now on, m a sample to that power. */
 static inline void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real limit)
 {
     const hsep_int width = 4 * self->spacing;
@@ -123,7 +123,7 @@ static inline void hsep_splines_init(
     }
 }
 
-/* Sum of the first count splines at sample k, with coefficients c, (count,), from spline -3 on. 4 multiply-adds. */
+/* Sum of the first count splines at sample k, with coefficients c, (count,), from spline -3 on. */
 static inline hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int k)
 {
     const hsep_real *b = hsep_splines_shape(self);
@@ -143,28 +143,16 @@ static inline void splines_change(const hsep_splines *self, const hsep_real c[],
     hsep_int k = first * spacing;
     hsep_zero(delta, k);
     for (hsep_int place = 0; k < self->preview; place++) { /* between two knots */
-        const hsep_int end = hsep_min(k + spacing, self->preview);
-        hsep_int within = 0;
-        if (place >= HSEP_N_DECIDED && place < count) {
-            const hsep_real c0 = c[place], c1 = c[place - 1], c2 = c[place - 2], c3 = c[place - 3];
-            for (; k + HSEP_LANES <= end; k += HSEP_LANES, within += HSEP_LANES) {
-                const hsep_real *b0 = b + within, *b1 = b0 + spacing, *b2 = b1 + spacing, *b3 = b2 + spacing;
-                const hsep_lanes sum = c0 * *hsep_lanes_const(b0) + c1 * *hsep_lanes_const(b1);
-                *hsep_lanes_at(delta + k) = (sum + c2 * *hsep_lanes_const(b2)) + c3 * *hsep_lanes_const(b3);
-            }
-        }
-        for (; k < end; k++, within++) { /* not all four are there, or no vector is left */
+        for (hsep_int within = 0; within < spacing && k < self->preview; within++, k++) {
             delta[k] = 0.0;
-            for (hsep_int i = 0; i <= HSEP_N_DECIDED && i <= place; i++) {
-                if (place - i < count) {
-                    delta[k] += c[place - i] * b[within + i * spacing];
-                }
+            for (hsep_int i = place < count ? 0 : place - count + 1; i <= HSEP_N_DECIDED && i <= place; i++) {
+                delta[k] += c[place - i] * b[within + i * spacing];
             }
         }
     }
 }
 
-/* The rows of the splines first ... n - 1 with coefficients c, (n - first,). Cost: 14 operations a sample. */
+/* The rows of the splines first ... n - 1 with coefficients c, (n - first,). */
 static inline void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real rows[])
 {
     const hsep_int preview = self->preview;
@@ -213,8 +201,7 @@ static inline void hsep_splines_exceeded(
     }
 }
 
-/* g, (n - first,), += A' rows, A being the matrix of hsep_splines_rows. The rows are used up. Cost: 9 operations a
- * sample, and 4 preview multiply-adds. */
+/* g, (n - first,), += A' rows, A being the matrix of hsep_splines_rows. The rows are used up. */
 static inline void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[])
 {
     const hsep_real *b = hsep_splines_shape(self);
@@ -269,7 +256,7 @@ static inline void splines_product(hsep_real products[], hsep_int i, hsep_int d,
 }
 
 /* The products A' diag(weights) A (hsep_knots_add). work: (4 preview + 4 HSEP_LANES_MOST,), of which the last ones are
- * read beside others. Cost: 40 spacing multiply-adds for each of these splines. */
+ * read beside others. */
 static inline void hsep_splines_gram(
     const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real products[], hsep_real work[])
 {
@@ -306,7 +293,7 @@ static inline hsep_real hsep_splines_energy(const hsep_splines *self)
 }
 
 /* The triangle of n rows := W' W of the splines behind a filter, W's columns being the filtered spline, (preview,),
- * each shifted by one spacing more. Each diagonal is a running sum: n preview / 2 multiply-adds. */
+ * each shifted by one spacing more. Each diagonal is a running sum. */
 static inline void hsep_splines_filtered_gram(
     const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[])
 {
@@ -414,7 +401,7 @@ static inline void hsep_knots_narrow(const hsep_knots *self, const hsep_real g[]
 }
 
 /* The triangle of m rows += a symmetric product of the uniform splines, products[HSEP_KNOTS_WIDTH i + HSEP_KNOTS_NEAR +
- * d] of spline i with i + d. work: (n + 2 HSEP_KNOTS_NEAR,). Cost: about 300 multiply-adds for each spline. */
+ * d] of spline i with i + d. work: (n + 2 HSEP_KNOTS_NEAR,). */
 static inline void hsep_knots_add(
     const hsep_knots *self, const hsep_real products[], hsep_real triangle[], hsep_real work[])
 {
