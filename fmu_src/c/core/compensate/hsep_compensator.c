@@ -191,7 +191,7 @@ static void compensator_solve(hsep_compensator *self)
         const hsep_int due = left > 0 ? 2 * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
         done = 0;
         for (hsep_int half = 0; !done && half < due; half++) {
-            done = hsep_planner_advance(hsep_compensator_planner(self));
+            done = hsep_planner_advance(hsep_compensator_planner(self)) == HSEP_PLAN_DONE;
         }
         if (done) {
             hsep_planner_carry_out(hsep_compensator_planner(self), hsep_at_const(predictor, predictor->x_d));

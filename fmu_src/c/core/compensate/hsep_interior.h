@@ -114,25 +114,6 @@ static slacks_step_lengths slacks_lengths(const slacks *self)
     return (slacks_step_lengths){.primal = of_s > 1.0 ? 1.0 / of_s : 1.0, .dual = of_z > 1.0 ? 1.0 / of_z : 1.0};
 }
 
-/* Return mu, the mean of s z, with B x in ds; *primal: the largest primal residual; *beyond: by how much the worst
- * bound is exceeded, negative inside all of them. The predictor's r_c is set, as if s z = 0 could be reached at once.
- */
-static hsep_real slacks_take_residuals(const slacks *self, hsep_real *primal, hsep_real *beyond)
-{
-    const slacks it = *self;
-    hsep_lanes largest = {0.0}, outside = largest - HSEP_HUGE(1e300);
-    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
-        const hsep_lanes s = AT(s), distance = AT(ds) - AT(b), r_p = distance - s;
-        AT(r_p) = r_p;
-        AT(r_c) = -(s * AT(z) * AT(inverse));
-        largest = hsep_larger(hsep_larger(r_p, -r_p), largest);
-        outside = hsep_larger(-distance, outside);
-    }
-    *primal = hsep_largest(largest);
-    *beyond = hsep_largest(outside);
-    return hsep_dot(it.s, it.z, it.n) / (hsep_real)it.n;
-}
-
 /* mu after the predictor's step, as far as s and z stay >= 0. */
 static hsep_real slacks_predicted(const slacks *self)
 {
@@ -289,20 +270,28 @@ static void interior_direction(const interior_arrays *a)
     interior_rows(a, a->dx);
 }
 
-/* The residuals at x, and whether it is the solution. */
+/* The residuals at x, and whether it is the solution; the predictor's r_c, as if s z = 0 could be reached at once. */
 static void interior_residuals(hsep_interior *self, const interior_arrays *a, const hsep_real P[])
 {
-    hsep_real r_p, beyond;
+    const slacks it = a->slacks;
+    hsep_lanes largest = {0.0}, outside = largest - HSEP_HUGE(1e300);
     interior_rows(a, a->problem.x);
-    const hsep_real mu = self->mu = slacks_take_residuals(&a->slacks, &r_p, &beyond);
+    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+        const hsep_lanes s = AT(s), distance = AT(ds) - AT(b), r_p = distance - s;
+        AT(r_p) = r_p;
+        AT(r_c) = -(s * AT(z) * AT(inverse));
+        largest = hsep_larger(hsep_larger(r_p, -r_p), largest);
+        outside = hsep_larger(-distance, outside);
+    }
+    const hsep_real beyond = hsep_largest(outside); /* negative inside all bounds */
     if (beyond < self->beyond) {
         self->beyond = beyond;
         hsep_copy(a->problem.inner, a->problem.x, a->n);
     }
-    const hsep_real r_d = interior_dual_residual(a, P);
-    self->solved =
-        self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
-        (mu < self->tolerance.mu * self->cost && r_p < self->tolerance.margin && r_d < self->tolerance.dual_residual);
+    const hsep_real mu = self->mu = hsep_dot(it.s, it.z, it.n) / (hsep_real)it.n, r_d = interior_dual_residual(a, P);
+    self->solved = self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
+                   (mu < self->tolerance.mu * self->cost && hsep_largest(largest) < self->tolerance.margin &&
+                    r_d < self->tolerance.dual_residual);
 }
 
 /* Begin with x and the bounds as they are. knots: of the last splines; P: a triangle of m rows; cost: its scale, m2. */

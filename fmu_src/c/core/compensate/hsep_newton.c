@@ -202,13 +202,23 @@ static void newton_products(hsep_newton *self, hsep_planner *planner)
     }
 }
 
-/* Splines of each distance of knots, and what they give with the physics model alone. */
-static void newton_shape_all(hsep_newton *self, hsep_planner *plans, const hsep_real spline[])
+HSEP_API void hsep_newton_init(
+    hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[])
 {
+    (void)hsep_newton_lay_out(self, parameters);
+    self->share = 1.0;
+    self->reach = HSEP_NEWTON_FIRST_REACH;
+    hsep_linearised_init(hsep_part(self, self->linearised), parameters);
     const hsep_splines *splines = hsep_planner_splines(plans);
-    const hsep_int spacing = splines->spacing, preview = self->preview;
-    const hsep_real *weight = hsep_at(self, self->weight), *b = hsep_splines_shape(splines);
-    for (hsep_int i = 0; i < self->m; i++) {
+    const hsep_int spacing = splines->spacing, preview = self->preview, half = preview / 2;
+    const hsep_int full = self->Np > half ? self->Np : half; /* errors that count in full; later ones fall */
+    const hsep_real *b = hsep_splines_shape(splines);
+    hsep_real *weight = hsep_at(self, self->weight);
+    for (hsep_int k = 0; k < preview; k++) {
+        const hsep_real left = (hsep_real)(preview - k) / (hsep_real)(preview - full + 1);
+        weight[k] = k < full ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
+    }
+    for (hsep_int i = 0; i < self->m; i++) { /* splines of each distance of knots, and W with the physics model alone */
         const hsep_knot knot = hsep_knots_at(&plans->knots, i);
         const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
         hsep_real *shape = newton_shape(self, knot.level), *passed = newton_passed(self, knot.level);
@@ -225,22 +235,6 @@ static void newton_shape_all(hsep_newton *self, hsep_planner *plans, const hsep_
     }
     newton_products(self, plans);
     hsep_copy(hsep_at(self, self->gram), hsep_planner_quadratic(plans), (hsep_int)hsep_triangle(self->m));
-}
-
-HSEP_API void hsep_newton_init(
-    hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[])
-{
-    (void)hsep_newton_lay_out(self, parameters);
-    self->share = 1.0;
-    self->reach = HSEP_NEWTON_FIRST_REACH;
-    hsep_linearised_init(hsep_part(self, self->linearised), parameters);
-    const hsep_int half = self->preview / 2, begin = self->Np > half ? self->Np : half, falling = self->preview - begin;
-    hsep_real *weight = hsep_at(self, self->weight);
-    for (hsep_int k = 0; k < self->preview; k++) {
-        const hsep_real left = (hsep_real)(self->preview - k) / (hsep_real)(falling + 1);
-        weight[k] = k < begin ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
-    }
-    newton_shape_all(self, plans, spline);
 }
 
 /* Half of the change of velocity that the slope of the next Newton step is taken over: a share of what this one changes
@@ -268,14 +262,12 @@ static void newton_judge(hsep_newton *self, const hsep_newton_task *task)
 {
     hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
     const hsep_real cost = newton_cost(self, task, c);
-    self->tries++;
     if (newton_better(cost, self->cost)) {
         self->gains = 1;
-        self->tries = HSEP_NEWTON_TRIES;
         self->cost = cost;
         newton_copy(self, best, c);
-    } else if (self->tries < HSEP_NEWTON_TRIES) {
-        const hsep_real shorter = newton_lengths[self->tries] / newton_lengths[self->tries - 1];
+    } else if (self->tries + 1 < HSEP_NEWTON_TRIES) {
+        const hsep_real shorter = newton_lengths[self->tries + 1] / newton_lengths[self->tries];
         for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
             c[j] = best[j] + shorter * (c[j] - best[j]);
         }
@@ -428,12 +420,12 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
     }
 
 /* Solve a programme in so many steps of its solver. */
-#define NEWTON_SOLVE(where, steps) \
-    for (self->status = HSEP_PLAN_OPEN; self->status >= HSEP_PLAN_BOUNDED;) { \
-        NEWTON_YIELD(where, self->status == HSEP_PLAN_OPEN ? NEWTON_PASS : newton_of_half(self)); \
-        self->status = self->status == HSEP_PLAN_OPEN  ? hsep_planner_solve(planner, steps) \
-                       : hsep_planner_advance(planner) ? HSEP_PLAN_DONE \
-                                                       : HSEP_PLAN_BOUNDED; \
+#define NEWTON_SOLVE(where, then, steps) \
+    NEWTON_YIELD(where, NEWTON_PASS); \
+    self->status = hsep_planner_solve(planner, steps); \
+    while (self->status == HSEP_PLAN_BOUNDED) { \
+        NEWTON_YIELD(then, newton_of_half(self)); \
+        self->status = hsep_planner_advance(planner); \
     }
 
 /* Make a plan, from one yield to the next. */
@@ -459,7 +451,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         if (self->planned) {
             NEWTON_YIELD(2, NEWTON_VARIANCES);
             newton_open(self, task);
-            NEWTON_SOLVE(3, self->follows ? HSEP_NEWTON_PHYSICS_STEPS : planner->steps)
+            NEWTON_SOLVE(3, 4, self->follows ? HSEP_NEWTON_PHYSICS_STEPS : planner->steps)
             self->planned = self->status == HSEP_PLAN_DONE;
         }
         newton_copy(self, of_physics, c);
@@ -471,9 +463,9 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->cost_of_rest = self->cost;
         if (self->ends) {
             newton_copy(self, c, rest);
-            NEWTON_YIELD(4, NEWTON_VARIANCES);
+            NEWTON_YIELD(5, NEWTON_VARIANCES);
             hsep_planner_end(planner, task->x_d);
-            NEWTON_SOLVE(5, planner->steps)
+            NEWTON_SOLVE(6, 7, planner->steps)
         }
 
         /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
@@ -481,41 +473,40 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->gains = 1;
         for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
             if (!self->gains) { /* what was predicted last was no better */
-                NEWTON_PREDICT(15, 17, hsep_at(self, self->best));
+                NEWTON_PREDICT(8, 9, hsep_at(self, self->best));
             }
-            NEWTON_YIELD(16, NEWTON_VARIANCES);
+            NEWTON_YIELD(10, NEWTON_VARIANCES);
             newton_copy(self, c, hsep_at(self, self->best));
             hsep_planner_open(planner, task->x_d, 1, self->bound); /* the model follows the friction */
-            NEWTON_YIELD(7, NEWTON_PASS);
+            NEWTON_YIELD(11, NEWTON_PASS);
             (void)newton_errors(self, task);
             hsep_linearised_at(
                 hsep_part(self, self->linearised), task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb),
                 self->reach);
             for (self->spline = 0; self->spline < self->m;) {
-                NEWTON_YIELD(8, newton_of_columns(self, self->spline));
+                NEWTON_YIELD(12, newton_of_columns(self, self->spline));
                 newton_columns(self, task);
             }
-            NEWTON_YIELD(9, newton_of_products(self));
+            NEWTON_YIELD(13, newton_of_products(self));
             newton_products(self, planner);
             hsep_planner_complete(planner, planner->jerk_weight);
-            NEWTON_SOLVE(10, planner->steps)
+            NEWTON_SOLVE(14, 15, planner->steps)
             self->gains = 0;
-            self->tries = HSEP_NEWTON_TRIES;
             if (self->status != HSEP_PLAN_FAILED) {
                 self->wider = hsep_fmin(HSEP_NEWTON_WIDER * self->reach, HSEP_NEWTON_MOST_REACH);
                 self->reach = newton_next_reach(self, task);
                 self->wider = hsep_fmax(self->reach, self->wider);
-                self->tries = 0;
             }
-            while (self->tries < HSEP_NEWTON_TRIES) {
-                NEWTON_PREDICT(11, 18, c);
+            self->tries = self->status != HSEP_PLAN_FAILED ? 0 : HSEP_NEWTON_TRIES;
+            for (; !self->gains && self->tries < HSEP_NEWTON_TRIES; self->tries++) {
+                NEWTON_PREDICT(16, 17, c);
                 newton_judge(self, task);
             }
         }
 
         /* The best of them and the physics model's plan */
         if (self->judges) {
-            NEWTON_PREDICT(12, 19, of_physics);
+            NEWTON_PREDICT(18, 19, of_physics);
             newton_compare(self, task);
         }
 
@@ -525,7 +516,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         /* The window under the plan, and its variances */
         self->samples = 0;
         hsep_averaged_weigh(task->model, HSEP_OF_PREDICTIONS, hsep_at(self, self->e_h), 0);
-        NEWTON_VARY(14, self->late + self->Np)
+        NEWTON_VARY(20, self->late + self->Np)
     }
     self->place = NEWTON_MADE;
 }

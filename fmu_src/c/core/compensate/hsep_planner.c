@@ -414,11 +414,11 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
     return HSEP_PLAN_BOUNDED;
 }
 
-HSEP_API int hsep_planner_advance(hsep_planner *self)
+HSEP_API hsep_plan_status hsep_planner_advance(hsep_planner *self)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     if (!hsep_interior_advance(hsep_part(self, self->interior), splines, hsep_planner_quadratic(self))) {
-        return 0;
+        return HSEP_PLAN_BOUNDED;
     }
     const hsep_problem problem = planner_problem(self);
     hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high, finite = 0.0;
@@ -436,7 +436,7 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
         way[j] = isfinite(finite) ? at[j] + share * way[j] : 0.0;
     }
     planner_take(self, way);
-    return 1;
+    return HSEP_PLAN_DONE;
 }
 
 /* Stop behind decided and shared coefficients, in place, (count,) m. */

@@ -52,8 +52,7 @@ static inline hsep_real hsep_planner_delta(const hsep_planner *self, hsep_int k)
 typedef enum {
     HSEP_PLAN_FAILED = 0, /* no finite plan: the remainder of the last one is followed */
     HSEP_PLAN_DONE,
-    HSEP_PLAN_BOUNDED, /* hsep_planner_advance is to be called until it returns 1 */
-    HSEP_PLAN_OPEN     /* it is to be solved */
+    HSEP_PLAN_BOUNDED /* hsep_planner_advance is to be called until it returns another one */
 } hsep_plan_status;
 
 /* Knots that a change of the last plan is solved for: of the splines that a bounded plan does not leave as they are. */
@@ -91,8 +90,8 @@ HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
  * plan, and in a bounded plan, which is solved within the tolerance. */
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps);
 
-/* Do half a step of a bounded plan; return whether the plan is made. */
-HSEP_API int hsep_planner_advance(hsep_planner *self);
+/* Do half a step of a bounded plan. */
+HSEP_API hsep_plan_status hsep_planner_advance(hsep_planner *self);
 
 /* Cost of the jerk of a plan, m2, work: (preview,). */
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[]);
