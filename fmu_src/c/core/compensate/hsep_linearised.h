@@ -228,8 +228,8 @@ static void linearised_slopes(
 }
 
 /* Begin to linearise a model that has learned, for a change of the commands that may begin at any sample of the
- * preview: what does not depend on the commands. change: (preview,) m, oldest first, nothing behind the first n; passed:
- * the same behind G_pb. */
+ * preview: what does not depend on the commands. change: (preview,) m, oldest first, nothing behind the first n;
+ * passed: the same behind G_pb. */
 static void hsep_linearised_begin(
     hsep_linearised *self, hsep_averaged *model, const hsep_real change[], const hsep_real passed[], hsep_int n)
 {

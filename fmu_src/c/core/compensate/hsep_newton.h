@@ -1,7 +1,7 @@
 /* Planner on the residual model with averaging, by Newton steps that follow the slope of its disturbances.
  *
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
- * delta. Each of one or two Gauss-Newton steps solves the quadratic programme of the model linearised at the best plan
+ * delta. Each of one to three Gauss-Newton steps solves the quadratic programme of the model linearised at the best plan
  * so far, friction over what the step before changed, and goes to its minimum if that lowers the cost. Once it has
  * learned, the averaged model judges all plans: its own, the physics model's, and the remainder of the last one; the
  * best is taken, of its own change of the last one a share. Where compensation is off a plan ends it.
@@ -17,7 +17,7 @@
 #include "hsep_predictor.h"
 #include "hsep_averaged_model.h"
 
-#define HSEP_NEWTON_TRIES 2  /* lengths of the last Newton step that are tried, */
+#define HSEP_NEWTON_TRIES 2  /* lengths of a Newton step that are tried */
 #define HSEP_NEWTON_VARIED 4 /* variances that are computed in a part */
 
 typedef struct {
@@ -83,7 +83,8 @@ HSEP_API void hsep_newton_init(
     hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan, but only samples that the plan leaves as they are,
- * and late ones. best: best model allowed, 0 none, 1 physics, 2 averaged, which judges plans once the warm-up is over. */
+ * and late ones. best: best model allowed, 0 none, 1 physics, 2 averaged, which judges plans once the warm-up is over.
+ */
 HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best);
 
 /* Do parts of the plan: this sample's equal share of what is left, samples being left until the plan is due; all of it
