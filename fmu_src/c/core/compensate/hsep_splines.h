@@ -340,7 +340,8 @@ static inline void hsep_splines_jerk(
 static const hsep_real knots_shares[] = {1.0,      0.125,   0.5,     0.75,     0.5,     0.125,  0.015625,
                                          0.0625,   0.15625, 0.3125,  0.484375, 0.625,   0.6875, 0.625,
                                          0.484375, 0.3125,  0.15625, 0.0625,   0.015625};
-static const hsep_int knots_lengths[HSEP_KNOTS_LEVELS] = {1, 5, 13}, knots_places[HSEP_KNOTS_LEVELS] = {0, 1, 6};
+static const hsep_int knots_places[HSEP_KNOTS_LEVELS] = {0, 1, 6};
+static inline hsep_int knots_length(int level) { return ((hsep_int)4 << level) - 3; }
 
 static inline hsep_knot hsep_knots_at(const hsep_knots *self, hsep_int i)
 {
@@ -354,7 +355,7 @@ static inline hsep_knot hsep_knots_at(const hsep_knots *self, hsep_int i)
         .first = end - self->count[level],
         .last = end - 1,
         .begin = self->begin[level] + ((i + self->count[level] - end) << level),
-        .length = knots_lengths[level],
+        .length = knots_length(level),
         .share = knots_shares + knots_places[level]};
 }
 
@@ -367,7 +368,7 @@ static inline hsep_knots hsep_knots_of(hsep_int n, hsep_int window)
     for (int level = 0; window > 0 && level < HSEP_KNOTS_LEVELS; level++) {
         const hsep_int apart = (hsep_int)1 << level, end = level < HSEP_KNOTS_LEVELS - 1 ? 2 * apart * wide : n;
         knots.begin[level] = begin;
-        for (; begin < end && begin + knots_lengths[level] <= n; begin += apart) {}
+        for (; begin < end && begin + knots_length(level) <= n; begin += apart) {}
         knots.count[level] = (begin - knots.begin[level]) / apart;
         begin -= 4 * apart; /* the next ones overlap */
     }
