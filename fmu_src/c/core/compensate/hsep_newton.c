@@ -330,10 +330,10 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
-/* What parts of a plan count as: HSEP_NEWTON_VARIED variances, what passes through the model or the solver once, for
- * all samples of a plan, columns abreast with several experts, and half a prediction of a plan. */
-#define NEWTON_VARIANCES 4
+/* What parts of a plan count as: what passes through the model or the solver once, for all samples of a plan; some
+ * variances, or the bounds of a plan; columns abreast, with several experts; and half a prediction of a plan. */
 #define NEWTON_PASS 8
+#define NEWTON_SOME 4
 #define NEWTON_COLUMNS 6
 #define NEWTON_PREDICTION 9
 
@@ -362,12 +362,12 @@ static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, h
                                newton_parts(window, HSEP_NEWTON_VARIED);
     const hsep_int of_physics =
         NEWTON_PASS + 2 * newton_of_half(self) * HSEP_NEWTON_PHYSICS_STEPS + 2 * NEWTON_PREDICTION;
-    hsep_int step =
-        2 * NEWTON_PASS + newton_of_products(self) + 2 * newton_of_half(self) * planner->steps + 2 * NEWTON_PREDICTION;
+    hsep_int step = 2 * NEWTON_PASS + NEWTON_SOME + newton_of_products(self) +
+                    2 * newton_of_half(self) * planner->steps + 2 * NEWTON_PREDICTION;
     for (hsep_int i = 0; i < self->m; i += newton_together(planner, i)) {
         step += newton_of_columns(self, i);
     }
-    return NEWTON_VARIANCES * (variances + 1) + of_physics + self->n_steps * step + NEWTON_PASS;
+    return NEWTON_SOME * (variances + 1) + of_physics + self->n_steps * step + NEWTON_PASS;
 }
 
 /* Predict more samples under a plan, up to one; the first ones with its commands. apart: as hsep_averaged_go_on's. */
@@ -415,7 +415,7 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
 /* Predict more samples of the plan with variances, up to one. */
 #define NEWTON_VARY(where, end) \
     while (self->samples < (end)) { \
-        NEWTON_YIELD(where, NEWTON_VARIANCES + (self->samples > 0 ? 0 : NEWTON_PASS)); \
+        NEWTON_YIELD(where, NEWTON_SOME + (self->samples > 0 ? 0 : NEWTON_PASS)); \
         newton_vary(self, task, c); \
     }
 
@@ -449,7 +449,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            NEWTON_YIELD(2, NEWTON_VARIANCES);
+            NEWTON_YIELD(2, NEWTON_SOME);
             newton_open(self, task);
             NEWTON_SOLVE(3, 4, self->follows ? HSEP_NEWTON_PHYSICS_STEPS : planner->steps)
             self->planned = self->status == HSEP_PLAN_DONE;
@@ -463,7 +463,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->cost_of_rest = self->cost;
         if (self->ends) {
             newton_copy(self, c, rest);
-            NEWTON_YIELD(5, NEWTON_VARIANCES);
+            NEWTON_YIELD(5, NEWTON_SOME);
             hsep_planner_end(planner, task->x_d);
             NEWTON_SOLVE(6, 7, planner->steps)
         }
@@ -475,7 +475,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
             if (!self->gains) { /* what was predicted last was no better */
                 NEWTON_PREDICT(8, 9, hsep_at(self, self->best));
             }
-            NEWTON_YIELD(10, NEWTON_VARIANCES);
+            NEWTON_YIELD(10, NEWTON_SOME);
             newton_copy(self, c, hsep_at(self, self->best));
             hsep_planner_open(planner, task->x_d, 1, self->bound); /* the model follows the friction */
             NEWTON_YIELD(11, NEWTON_PASS);
@@ -563,6 +563,6 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
     self->follows = self->judges && best > 1;
     self->ends = best == 0 && was_planned > 0;
     /* This sample has begun, and learned the last window */
-    self->next = 2 * NEWTON_PASS + NEWTON_VARIANCES * newton_parts(self->samples, HSEP_NEWTON_VARIED);
+    self->next = 2 * NEWTON_PASS + NEWTON_SOME * newton_parts(self->samples, HSEP_NEWTON_VARIED);
     self->left = self->next + newton_of_plan(self, task->planner, self->samples);
 }

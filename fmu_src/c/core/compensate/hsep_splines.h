@@ -384,7 +384,9 @@ static inline void hsep_knots_widen(const hsep_knots *self, const hsep_real x[],
     hsep_zero(c, self->n);
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_knot knot = hsep_knots_at(self, i);
-        hsep_axpy(c + knot.begin, x[i], knot.share, knot.length);
+        for (hsep_int j = 0; j < knot.length; j++) {
+            c[knot.begin + j] += x[i] * knot.share[j];
+        }
     }
 }
 
