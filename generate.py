@@ -17,7 +17,7 @@ from typing import Any
 from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import PARAMETERS
-from hybridsep.compensate import newton, planning, qp, splines, stop
+from hybridsep.compensate import limits, newton, planning, qp, splines, stop
 from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 from hybridsep.predict import uncertainty
 from hybridsep.predict.averaging import experts, features, model, recall, stacking, start
@@ -44,6 +44,7 @@ PREDICTIONS: Declared = {
 PLANS: Declared = {
     "splines": [splines],
     "qp": [qp],
+    "limits": [limits],
     "newton": [newton],
     "planning": [planning],
     "stop": [stop],

@@ -272,7 +272,7 @@ class CompensatorSettings(Settings):
     by what these take more. ``no_reversal`` has no effect without them; with ``averaging`` it bounds the physics
     model's plan in the hybrid's stead alone. ``change_max``, None for no bound, is about twice the servo error
     without compensation; ``following_error_max`` about 1.3 times the largest one
-    (:class:`~hybridsep.online.look_ahead.Monitor`). With ``averaging`` a hybrid plan of motion more than 1.25 times as
+    (:class:`~hybridsep.online.monitor.Monitor`). With ``averaging`` a hybrid plan of motion more than 1.25 times as
     fast as what was learned changes the command by at most half of ``change_max``, and so does the physics model's,
     unless weights of earlier runs judge it.
     """

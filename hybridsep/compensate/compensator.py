@@ -25,11 +25,12 @@ from ..base.settings import CompensatorSettings, samples_before
 from ..base.signals import as_measured, as_published, as_samples
 from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..base.threads import one_blas_thread
-from ..online.look_ahead import LookAhead, Monitor, PublishedWindow, SepState
+from ..online.look_ahead import LookAhead, PublishedWindow, SepState
+from ..online.monitor import Monitor
 from ..predict.averaging.features import Disturbance
 from ..predict.predictor import HybridPredictor
+from .limits import DriveBounds
 from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
-from .qp import DriveBounds
 from .splines import N_DECIDED, SplineBasis
 from .stop import Stop
 

@@ -30,7 +30,8 @@ from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, SolvedExpert
 from ..predict.averaging.features import N_FRICTION, N_LASTING, N_SPANS, N_STOPS, StaticFeatures, StaticState
 from ..predict.averaging.model import AveragedForecast, AveragedModel
 from ..predict.window import ResidualWindow
-from .qp import Bounds, Tolerance, solve_change
+from .limits import Bounds
+from .qp import Tolerance, solve_change
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
 _OWN_REACH = 1e-3

@@ -23,8 +23,9 @@ from ..predict.averaging.experts import EXPERTS
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
+from .limits import Bounds, DriveBounds
 from .newton import FIRST_REACH, PHYSICS_STEPS, THRICE, TOLERANCE, TWICE, AveragedPlanner, PlanModel, is_better
-from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve, solve_change
+from .qp import EXACT, Tolerance, solve, solve_change
 from .splines import N_DECIDED, SplineBasis, solved_splines
 
 _ENDS, _NEW = 5.0, 1e9

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.settings import PLAN_END
 from ..base.signals import Array
-from .qp import ROUNDING, DriveBounds
+from .limits import ROUNDING, DriveBounds
 from .splines import N_DECIDED, SplineBasis
 
 _TRIES = 12

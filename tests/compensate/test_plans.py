@@ -17,9 +17,10 @@ from staircase_data import commanded
 
 from hybridsep.base.settings import Limits, PredictorSettings
 from hybridsep.base.signals import Array
+from hybridsep.compensate.limits import Bounds, DriveBounds
 from hybridsep.compensate.newton import TOLERANCE
 from hybridsep.compensate.planning import has_stable_poles
-from hybridsep.compensate.qp import EXACT, Bounds, DriveBounds, Minimum, Tolerance, solve
+from hybridsep.compensate.qp import EXACT, Minimum, Tolerance, solve
 from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis, solved_splines
 from hybridsep.compensate.stop import Stop
 from hybridsep.cosim.loop import cosimulate

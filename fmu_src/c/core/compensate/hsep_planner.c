@@ -170,7 +170,7 @@ static void planner_limits(
         }
     }
     for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
-        const hsep_real exceeded = high[r], most = (1.0 - HSEP_QP_ROUNDING) * (r < preview ? change_max : 1.0);
+        const hsep_real exceeded = high[r], most = (1.0 - HSEP_LIMITS_ROUNDING) * (r < preview ? change_max : 1.0);
         low[r] = hsep_fmin(exceeded, 0.0) - most;
         high[r] = hsep_fmax(exceeded, 0.0) + most;
     }
@@ -201,13 +201,13 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], int m
     (void)planner_third(self, hsep_at(self, self->c), count, hsep_at(self, self->third));
     for (hsep_int k = 0; k < preview && self->no_reversal && !may_turn; k++) { /* velocities */
         const hsep_real step = x_d[k] - (k > 0 ? x_d[k - 1] : self->x_d_before[2]);
-        low[preview + k] = step > HSEP_QP_MOVES ? 0.0 : low[preview + k];
-        high[preview + k] = step < -HSEP_QP_MOVES ? 0.0 : high[preview + k];
+        low[preview + k] = step > HSEP_LIMITS_MOVES ? 0.0 : low[preview + k];
+        high[preview + k] = step < -HSEP_LIMITS_MOVES ? 0.0 : high[preview + k];
     }
     /* The remainder is always feasible, with a small margin: an interior-point method needs an interior */
     for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
-        low[r] = hsep_fmin(low[r], total[r] - HSEP_QP_INTERIOR);
-        high[r] = hsep_fmax(high[r], total[r] + HSEP_QP_INTERIOR);
+        low[r] = hsep_fmin(low[r], total[r] - HSEP_LIMITS_INTERIOR);
+        high[r] = hsep_fmax(high[r], total[r] + HSEP_LIMITS_INTERIOR);
     }
 }
 
@@ -220,7 +220,7 @@ static hsep_real planner_share(const hsep_planner *self, const hsep_real from[],
     for (hsep_int r = 0; r < HSEP_ORDERS * hsep_planner_splines(self)->preview; r++) {
         const hsep_real here = total[r] + from[r];
         const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? high[r] - here : here - low[r];
-        if (to > HSEP_QP_ROUNDING && room < share * to) {
+        if (to > HSEP_LIMITS_ROUNDING && room < share * to) {
             share = room / to;
         }
     }
@@ -475,8 +475,8 @@ static void stop_bounds(hsep_stop *self, const hsep_planner *planner, const hsep
     hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
     planner_limits(planner, x_d, 0, self->preview, 1.0, total, low, high);
     for (hsep_int r = 0; r < HSEP_ORDERS * self->preview; r++) {
-        low[r] = hsep_fmin(low[r] - total[r], start[r]) - HSEP_QP_ROUNDING;
-        high[r] = hsep_fmax(high[r] - total[r], start[r]) + HSEP_QP_ROUNDING;
+        low[r] = hsep_fmin(low[r] - total[r], start[r]) - HSEP_LIMITS_ROUNDING;
+        high[r] = hsep_fmax(high[r] - total[r], start[r]) + HSEP_LIMITS_ROUNDING;
     }
 }
 

@@ -188,7 +188,7 @@ static inline void hsep_splines_exceeded(
         hsep_real *row = rows + order * count;
         hsep_int done = 0;
         for (hsep_int k = 0; k < count; k++) {
-            if (hsep_fabs(row[k]) > HSEP_QP_EXCEEDED) {
+            if (hsep_fabs(row[k]) > HSEP_LIMITS_EXCEEDED) {
                 for (; done + near < k; done++) {
                     row[done] = 0.0;
                 }
