@@ -39,7 +39,7 @@ PREDICTIONS: Declared = {
     "recall": [recall],
     "averaging": [model],
 }
-"""Modules whose constants the C core has, those with a name of their own and a reason behind them, by C's prefix."""
+"""Modules whose constants the C core has, those with a name of their own and a reason after them, by C's prefix."""
 
 PLANS: Declared = {
     "splines": [splines],
@@ -182,7 +182,7 @@ def _defines(declared: Declared) -> list[str]:
 
 
 def _declared(module: ModuleType) -> list[str]:
-    """Return the names of a module's constants that C has: with a reason, a comment or a text, behind them."""
+    """Return the names of a module's constants that C has: with a reason, a comment or a text, after them."""
     names: list[str] = []
     text = Path(module.__file__ or "").read_text(encoding="utf-8")
     lines = text.splitlines()

@@ -9,7 +9,7 @@ samples only the splines that begin in the first window are applied, then the ne
 Position, velocity and acceleration of ``δ`` are continuous by construction, also between windows and between models.
 Every spline ends within its plan, so a plan returns to ``x_d`` at its end, where its error counts least, and its
 remainder keeps the limits. The next plan starts from that remainder: there is always a feasible plan, and where no
-other can be computed the remainder is followed. Where the preview is shorter than the drive needs, plans go on behind
+other can be computed the remainder is followed. Where the preview is shorter than the drive needs, plans go on after
 it, and what is carried out of them has a stop within the limits (:mod:`~hybridsep.compensate.stop`).
 """
 

@@ -30,7 +30,7 @@ from .splines import N_DECIDED, SplineBasis, solved_splines
 
 _ENDS, _NEW = 5.0, 1e9
 """Periods in a plan of the change whose jerk weighs as much as the change itself in a plan that ends compensation; and
-the factor of what it may be behind the last plan, so that it is nothing there and ends as soon as the remainder."""
+the factor of what it may be after the last plan, so that it is nothing there and ends as soon as the remainder."""
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ may change it by all of ``change_max`` where weights of earlier runs judge it.""
 
 _TAKEN_BACK, _LEAST_SHARE, _NEAR = 0.2, 0.7, 4
 """A plan takes a share of its change of the last one, which grows or falls by the first times the cosine between what
-it changes and what the last plan has changed, up to 1 and down to the second. Both are taken over so many windows. A
+it changes and what the last plan has changed, up to 1 and down to the second. Both are taken over this many windows. A
 new plan corrects what was measured last; where a drive is too slow for that, or the model wrong at a frequency, the
 next one takes back what this one has corrected, and the command swings from window to window, also at rest."""
 

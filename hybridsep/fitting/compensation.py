@@ -47,7 +47,7 @@ LIMITS_WORDS = (  # what the limits of :func:`estimated_limits` are
 _SCALE = 0.05
 """Velocity scale of what a compensator begins with, relative to the largest velocity of a log. A log's first motion may
 be ten times as fast: then no stop operator is as short as a belt's friction before sliding, and a warm loop has 1.16
-times the error of a cold one instead of 0.97. Predictions alone are 2 % worse with it on recorded axes."""
+times the error of a cold one instead of 0.97. Mere predictions are 2 % worse with it on recorded axes."""
 
 _CHANGED = ("acceleration", "jerk", "change_max")  # entries of ``[drive_limits]`` whose cost is said
 FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to say what it costs
@@ -197,7 +197,7 @@ class LookAheads:
     off: float  # RMS of the error without compensation, m
     duration: float  # of the stretch, s
     T_s: float
-    is_rough: bool = False  # whether the command's own jerk is above its limit: plans behind a preview may run away
+    is_rough: bool = False  # whether the command's own jerk is above its limit: plans past a preview may run away
 
     def figures(self, shown: DisplayUnits) -> tuple[str, list[str], list[list[str]]]:
         """Return title, head and rows of a table."""

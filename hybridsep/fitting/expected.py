@@ -99,7 +99,7 @@ class Trial:
             residual = x[late:] - discrete.forced_response(discrete.rest(), x_d - start)[0][:n] - start
             at_rest = np.append(residual[~np.isnan(residual)], 0.0)[0]
             residual = np.pad(residual, (delay, late), constant_values=(at_rest, 0.0))
-            # Behind its end the command goes on, as plans would see a stop in it that never comes
+            # After its end the command goes on, as plans would see a stop in it that never comes
             further = x_d[-1] + np.diff(x_d[-2:]).sum() * np.arange(1, delay + 1)
             command, drive, on_the_way = np.append(x_d, further), discrete.stepper(), deque([start] * late)
             x_dm, true = np.empty((2, delay + len(x_d)))

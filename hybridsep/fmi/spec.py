@@ -124,7 +124,7 @@ def fmu_name(model: str, machine: str, flavour: str = FLAVOURS[0], fmi: str = FM
     if fmi not in FMI_VERSIONS:
         raise FmuError(f"the version of FMI must be one of {', '.join(FMI_VERSIONS)}, got {fmi!r}")
     if flavour == "python" and fmi != "2":
-        raise FmuError(f"FMUs of the Python flavour are of FMI 2 alone, as pythonfmu's are, got FMI {fmi}")
+        raise FmuError(f"FMUs of the Python flavour are of FMI 2 only, as pythonfmu's are, got FMI {fmi}")
     return f"{model}{_SUFFIX[flavour, fmi]}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
 
 

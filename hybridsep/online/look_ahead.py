@@ -6,7 +6,7 @@ predictor only, which is the planner that changes nothing (:class:`_Unmodified`)
 multiple of ``Np``, all commands of the next window's preview and every measurement before it have arrived: the weights
 are solved and the window is planned in that sample.
 
-During the first fill (``k < delay``) the commanded position is the start. A predictor alone neither predicts nor learns
+During the first fill (``k < delay``) the commanded position is the start. A mere predictor neither predicts nor learns
 it. A compensator plans from the beginning, so that it can act ahead of a move within its preview; it does not learn
 what is measured over the fill. ``t_init`` counts from the end of the fill.
 """
@@ -137,7 +137,7 @@ class LookAhead:
     t_init : float, optional
         Warm-up after the first fill, s; the predictor's own if left out, 0 for a warm start.
     unit : {"m", "rad"}
-        Of positions: those of a rotary axis may be larger.
+        Of positions; a rotary axis may have larger ones.
 
     Attributes
     ----------
@@ -155,7 +155,7 @@ class LookAhead:
     """
 
     x_d: float = _now("x_d", "Commanded position now, m.")
-    x_dm: float = _now("x_dm", "Modified command now, m; ``x_d`` with a predictor alone.")
+    x_dm: float = _now("x_dm", "Modified command now, m; ``x_d`` with only a predictor.")
     x_pb: float = _now("x_pb", "Physics-based prediction for now, m.")
     x_h: float = _now("x_h", "Prediction for now by the best available model, m.")
     x_h_std: float = _now("x_h_std", "Standard deviation of ``x_meas − x_h`` now, m; 0 where it is not known.")
@@ -235,7 +235,7 @@ class LookAhead:
 
     @property
     def sep_state(self) -> int:
-        """Model that planned the commands of now, or tripped (``SepState``); 0 with a predictor alone."""
+        """Model that planned the commands of now, or tripped (``SepState``); 0 with only a predictor."""
         if self.alarm:
             return SepState.TRIPPED
         return self.window.state if self.k % self.Np >= self.window.n_followed else self.window.state_before
@@ -318,7 +318,7 @@ class LookAhead:
 
     @property
     def _first_compared(self) -> int:
-        """First sample that is compared: with what was published behind the first fill, as it was measured."""
+        """First sample that is compared: with what was published after the first fill, as it was measured."""
         return self.delay + self.predictor.settings.n_late
 
     def _compare(self) -> None:

@@ -141,7 +141,7 @@ static int compensator_has_stable_poles(const hsep_recursion *recursion, hsep_re
     return 1;
 }
 
-/* Samples of a window that follow the last plan while one is made, not one alone: spread needs differences. */
+/* Samples of a window that follow the last plan while one is made, not only one: spread needs differences. */
 static hsep_int compensator_pinned(hsep_compensator *self)
 {
     const hsep_int pinned = hsep_planner_pinned(hsep_compensator_planner(self));
