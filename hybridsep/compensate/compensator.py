@@ -78,13 +78,9 @@ class SepCompensator:
         self.preview, self.spacing, self.horizon = settings.preview, settings.spacing, settings.horizon
         predictor.plan_ahead(self.preview)
         self._basis = SplineBasis(self.horizon, self.spacing, Np)
-        bounds = self._bounds(settings)
-        self._planning: Planning
-        if predictor.settings.averaging:
-            self._planning = AveragedPlanning(self._basis, bounds, settings, Np)
-        else:
-            self._planning = PaperPlanning(self._basis, bounds, settings, Np)
-        self._stop = self._stop_within(bounds)
+        planning = AveragedPlanning if predictor.settings.averaging else PaperPlanning
+        self._planning: Planning = planning(self._basis, self._bounds(settings), settings, Np)
+        self._stop = self._stop_within(self._planning.bounds)
         self.restart(predictor.start, t_init=predictor.settings.warm_up)
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:

@@ -70,7 +70,7 @@ class DriveBounds:
         *,
         no_reversal: bool = False,
     ) -> None:
-        self._no_reversal, self._near = no_reversal, 4 * basis.spacing
+        self._no_reversal, self._near = no_reversal and limits is not None, 4 * basis.spacing
         self._scales: list[tuple[int, float]] = []
         if limits is not None:
             bounds = limits.velocity * T_s, limits.acceleration * T_s**2, limits.jerk * T_s**3
@@ -86,13 +86,10 @@ class DriveBounds:
         parts = [np.diff(extended, order, axis=0)[3 - order :] / bound for order, bound in self._scales]
         return np.concatenate(parts) if parts else np.zeros((0, values.shape[1]))
 
-    def shares(self, spacing: int) -> tuple[float, float, float]:
-        """Return what differences of coefficients, of orders 1 to 3, take of the limits, 1/m."""
+    def shares(self, spacing: int) -> list[float]:
+        """Return what differences of coefficients, of orders 1 to 3, take of the limits, 1/m; 1 without limits."""
         bounds = dict(self._scales)
-        if 1 not in bounds:
-            return 1.0, 1.0, 1.0
-        one, two, three = (1.0 / (float(spacing) ** order * bounds[order]) for order in (1, 2, 3))
-        return one, two, three
+        return [1.0 / (float(spacing) ** order * bounds[order]) if 1 in bounds else 1.0 for order in (1, 2, 3)]
 
     def bounds(
         self,
@@ -133,12 +130,10 @@ class DriveBounds:
         most = np.repeat([(1.0 - ROUNDING) * (1.0 if order else change) for order, _ in self._scales], len(x_d))
         own = np.concatenate((np.zeros(0), *(self._own(x_d, x_d_before, *scale) for scale in self._scales)))
         least, most = np.minimum(own, 0.0) - most, np.maximum(own, 0.0) + most
-        if self._no_reversal and not may_turn:
-            steps, n = first_differences(x_d, x_d_before[-1]), len(x_d)
-            for i, (order, _) in enumerate(self._scales):
-                if order == 1:
-                    least[i * n : (i + 1) * n][steps > _MOVES] = 0.0
-                    most[i * n : (i + 1) * n][steps < -_MOVES] = 0.0
+        if self._no_reversal and not may_turn:  # the velocity's rows are the first
+            steps = first_differences(x_d, x_d_before[-1])
+            least[: len(x_d)][steps > _MOVES] = 0.0
+            most[: len(x_d)][steps < -_MOVES] = 0.0
         return least - offset, most - offset
 
     def _own(self, x_d: Array, before: Array, order: int, bound: float) -> Array:

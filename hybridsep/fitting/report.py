@@ -150,8 +150,7 @@ def _correlations(test: ResidualTest, T_s: float) -> Chart:
 
 
 def _write_time(report: Report, judged: Judged) -> None:
-    scale, unit = judged.unit
-    replay = judged.replay
+    (scale, unit), replay = judged.unit, judged.replay
     errors, std = scale * replay.errors(), scale * replay.joined("x_h_std")
     t = judged.T_s * np.arange(errors.shape[1])
     factor, position = judged.shown.position
@@ -177,8 +176,7 @@ def _write_horizon(report: Report, judged: Judged) -> None:
     horizon = scale * judged.replay.horizon()
     ahead = 1e3 * judged.T_s * np.arange(1, judged.replay.Np + 1)
     lines = [Line(name, ahead, row, colour) for name, row, colour in zip(_NAMES, horizon, _COLOURS, strict=True)]
-    how = "How the error grows from the window's first sample on."
-    report.chart(Chart("ahead [ms]", (f"RMS error [{unit}]",), lines, how))
+    report.chart(Chart("ahead [ms]", (f"RMS error [{unit}]",), lines, "How the error grows within the window."))
 
 
 def write_moves(report: Report, judged: Judged, in_position: float) -> None:
