@@ -211,7 +211,7 @@ class LookAheads:
             binds = ["look-ahead"] if self.longer(one) else []
             binds += [*one.settings, *(f"{name} {100 * share:.2g} %" for name, share in one.limits.items())]
             name = f"{1e3 * one.preview * self.T_s:.4g}{', chosen' if one.preview == self.chosen else ''}"
-            sizes = f"{factor * one.left:.4g}", f"{one.left / self.off:.3f}"
+            sizes = f"{factor * one.left:.4g}", f"{one.left / self.off:.2g}"
             rows.append([name, *sizes, ", ".join(binds) or "nothing"])
         return title, ["ahead [ms]", f"RMS [{unit}]", "× off", "what binds"], rows
 
