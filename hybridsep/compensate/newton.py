@@ -268,7 +268,7 @@ class PlannedPoint:
     """Plan with what the model predicts under it."""
 
     coefficients: Array  # (3 + n_free,), m
-    prediction: AveragedForecast
+    prediction: AveragedForecast  # under the plan, of the residual
     x_h: Array  # (preview,), m, relative to the start
     third: Array  # (preview,), m, third differences of δ
     cost: float  # m²
@@ -280,7 +280,7 @@ class AveragedPlanner:
 
     basis: SplineBasis
     splines: Array  # (n_free, m): those that are solved for, as sums of the free ones (``splines.solved_splines``)
-    jerk_weight: float
+    jerk_weight: float  # as of :class:`~hybridsep.base.settings.CompensatorSettings`
     model: PlanModel  # of the plan that the window begins
     x_d: Array  # (preview,), m: commanded positions, relative to the start
     delta_before: Array  # (3,), m: last three values of δ

@@ -107,8 +107,8 @@ class _Newton:
     """Newton's equations of a step: ``P dx − Bᵀ dz = r_d``, ``ds = B dx + r_p + ρ dz``, ``z ds + s dz = r_c``."""
 
     factor: tuple[Array, bool]  # of ``P + Bᵀ diag(z · inverse) B``, from :func:`scipy.linalg.cho_factor`
-    B: Array
-    z: Array
+    B: Array  # (2m, n): the bounds' rows, low and high
+    z: Array  # (2m,): multipliers
     inverse: Array  # (2m,): ``1 / (s + ρ z)``
     # (2m,), (n,): primal residual ``B x − b − s`` and dual residual ``v − P x + Bᵀ z``
     r_p: Array

@@ -196,7 +196,7 @@ class LookAheads:
     chosen: int  # preview of the machine, samples
     off: float  # RMS of the error without compensation, m
     duration: float  # of the stretch, s
-    T_s: float
+    T_s: float  # s
     is_rough: bool = False  # whether the command's own jerk is above its limit: plans past a preview may run away
 
     def figures(self, shown: DisplayUnits) -> tuple[str, list[str], list[list[str]]]:
@@ -272,7 +272,7 @@ class Tracking:
     motion: Mapping[str, Sequence[float]]  # name of a limit → largest of the logs' commands, and the drive's, SI
     held: int  # samples for which each command is the same
     rounding: float  # step of the commands, m
-    T_s: float
+    T_s: float  # s
     look_aheads: LookAheads | None  # None where the model has no error to compensate
 
     def lines(self, shown: DisplayUnits) -> list[str]:

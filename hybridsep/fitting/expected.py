@@ -47,11 +47,11 @@ def limits_that_bind(x_d: Array, x_dm: Array, T_s: float, settings: CompensatorS
 
 
 class Expected(NamedTuple):
-    """Commanded minus measured position without and with compensation, and the commands of the latter, ``(n,)``, m."""
+    """Errors without and with compensation, and the commands of the latter."""
 
-    without: Array
+    without: Array  # (n,), m: commanded minus measured position, as the next
     compensated: Array
-    x_d: Array
+    x_d: Array  # (n,), m: commanded position, and the modified one
     x_dm: Array
 
 

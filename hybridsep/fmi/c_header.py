@@ -48,8 +48,8 @@ class _Layout:
     """The parts of an FMU's table: single variables, the modes' variables, more single ones, then windows."""
 
     scalars: tuple[Variable, ...]
-    modes: tuple[Variable, ...]
-    last: tuple[Variable, ...]
+    modes: tuple[Variable, ...]  # four numbers of each
+    last: tuple[Variable, ...]  # what was added since
     windows: tuple[tuple[Variable, ...], ...]  # the samples of each window, all windows of one length
 
     @property
