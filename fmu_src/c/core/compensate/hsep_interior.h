@@ -45,7 +45,7 @@ typedef struct {
     hsep_real *factor;     /* and for a triangle of n rows */
 } hsep_problem;
 
-/* Slacks and multipliers of the bounds B x >= b, those of the low rows, then those of the high ones, as qp.py has them:
+/* Slacks and multipliers of the bounds B x >= b, of the low rows, then of the high ones, as qp.py has them:
  * B = [A; -A], b = [low; -high]. A proximal term rho regularises the multipliers: ds = B dx + r_p + rho dz,
  * z ds + s dz = r_c (s + rho z). */
 typedef struct {
@@ -143,7 +143,7 @@ static hsep_real slacks_move(const slacks *self)
     return primal;
 }
 
-/* The arrays behind the struct. */
+/* The arrays after the struct. */
 typedef struct {
     const hsep_splines *splines;
     const hsep_knots *knots;

@@ -6,7 +6,7 @@
  *
  *   dx_h = (1 - pi_A) G_pb + pi_L df_L + pi_S df_S + pi_A dx_A
  *
- * The expert of the command alone, A, is linear and time-invariant: its features are increments and lags of the
+ * The expert of only the command, A, is linear and time-invariant: its features are increments and lags of the
  * command. The expert D, which doubts earlier runs, counts as the expert whose counterpart it is.
  */
 #ifndef HSEP_LINEARISED_H
@@ -28,13 +28,13 @@ typedef struct {
     hsep_int shrink;      /* (n,) of experts: share of each one in the stack */
     hsep_int commands;    /* (1 + preview,) of a change, with one sample before it, */
     hsep_int velocity;    /* (2 + preview,) v_d of a change, with two samples before it, */
-    hsep_int position;    /* (2 + preview,) and it behind G_pb */
+    hsep_int position;    /* (2 + preview,) and it after G_pb */
     hsep_int base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
     hsep_int response;    /* (preview + 3,) of experts: the response to it, of x_pb's features or of the command */
-    hsep_int run;         /* (preview + 3,) abreast: work of a recursion; alone: newest first */
+    hsep_int run;         /* (preview + 3,) abreast: work of a recursion; one: newest first */
     hsep_int lags;        /* (p + 3,) weights of the lags, as often as a vector has lanes */
     hsep_int disturbance; /* (preview + 3,) abreast: disturbances that a change makes, */
-    hsep_int drive;       /* and these behind G_pb */
+    hsep_int drive;       /* and these after G_pb */
     hsep_int physics;     /* G_pb at rest, */
     hsep_int filters;     /* and of each column */
 } hsep_linearised;
@@ -229,7 +229,7 @@ static void linearised_slopes(
 
 /* Begin to linearise a model that has learned, for a change of the commands that may begin at any sample of the
  * preview: what does not depend on the commands. change: (preview,) m, oldest first, nothing behind the first n;
- * passed: the same behind G_pb. */
+ * passed: the same after G_pb. */
 static void hsep_linearised_begin(
     hsep_linearised *self, hsep_averaged *model, const hsep_real change[], const hsep_real passed[], hsep_int n)
 {

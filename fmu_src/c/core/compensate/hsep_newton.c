@@ -64,7 +64,7 @@ static void newton_command(hsep_newton *self, const hsep_newton_task *task, cons
     }
 }
 
-/* Whether the unmodified commands, and the physics model behind them, outgrow what is learned by HSEP_PLANNING_FASTER:
+/* Whether the unmodified commands, and the physics model's answer, outgrow what is learned by HSEP_PLANNING_FASTER:
  * in their largest change from sample to sample over the plan and the late samples. */
 static int newton_outgrows(hsep_newton *self, const hsep_newton_task *task)
 {
@@ -356,7 +356,7 @@ static hsep_int newton_of_columns(hsep_newton *self, hsep_int first)
  * Newton step, rarely tried, adds a prediction. */
 static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, hsep_int predicted)
 {
-    const hsep_int window = self->late + self->Np, behind = self->preview - self->Np;
+    const hsep_int window = self->late + self->Np, beyond = self->preview - self->Np;
     const hsep_int variances = newton_parts(window - predicted, HSEP_NEWTON_VARIED) +
                                newton_parts(behind, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) +
                                newton_parts(window, HSEP_NEWTON_VARIED);
@@ -419,7 +419,7 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
         newton_vary(self, task, c); \
     }
 
-/* Solve a programme in so many steps of its solver. */
+/* Solve a programme in a number of steps of its solver. */
 #define NEWTON_SOLVE(where, then, steps) \
     NEWTON_YIELD(where, NEWTON_PASS); \
     self->status = hsep_planner_solve(planner, steps); \

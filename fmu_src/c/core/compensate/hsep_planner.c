@@ -3,16 +3,16 @@
 #include "hsep_cholesky.h"
 #include "hsep_interior.h"
 
-/* Stops of plans that are longer than the preview: behind the preview a plan takes the command to go on at its last
+/* Stops of plans that are longer than the preview: after the preview a plan takes the command to go on at its last
  * velocity. What comes may be another command, so each plan has a stop beside it: it shares the splines that are
  * carried out before the next plan, and then brings the change of the command to a constant within the preview, which
  * takes nothing of the limits of what follows. A plan is carried out as far as it has a stop within the limits;
  * otherwise the last stop goes on. */
 typedef struct {
     hsep_int preview; /* samples of the command that are known */
-    hsep_int shared;  /* splines that a stop has from its plan, those of a window and the next plan's pinned ones, */
+    hsep_int shared;  /* splines that a stop has from its plan, a window's and the next plan's pinned ones, */
     hsep_int n;       /* and those before all coefficients are alike */
-    hsep_int count;   /* coefficients: the decided ones and those of all splines that begin in the preview */
+    hsep_int count;   /* coefficients: the decided ones and of all splines that begin in the preview */
     hsep_int last;    /* (count,) m, the last stop, */
     hsep_int own;     /* (count,) m, by which it differs from one that stops as these do, */
     hsep_int now;     /* (count,) m, and the stop of the plan */
@@ -113,7 +113,7 @@ static void stop_gains(hsep_stop *self, const hsep_splines *splines)
         of[order] = (splines->share[order] / unit) * (splines->share[order] / unit);
     }
     const hsep_real one = of[1], two = of[2], three = of[3];
-    hsep_real p11 = two + 2.0 * three, p12 = three, p22 = three; /* the difference behind the last spline is 0 */
+    hsep_real p11 = two + 2.0 * three, p12 = three, p22 = three; /* the difference after the last spline is 0 */
     for (hsep_int i = self->n - self->shared; i-- > 0;) {
         const hsep_real both = p12 + p22, total = one + two + three + p11 + p12 + both;
         const hsep_real g1 = (two + three + both) / total, g2 = three / total, h1 = g1 - 1.0, h2 = g2 - 1.0;
@@ -149,7 +149,7 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_predictor_paramet
 }
 
 /* Rows of x_dm, (4 preview,) in shares, under the first count coefficients of the remainder of the last plan; of order
- * 0 of the change alone. low, high: the limits, with a share of change_max. Where x_d itself exceeds one within the
+ * 0 of only the change. low, high: the limits, with a share of change_max. Where x_d itself exceeds one within the
  * length of a spline, as a command that is held or rounded does, what it takes is added to the limit. */
 static void planner_limits(
     const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int preview, hsep_real change_max,
@@ -439,7 +439,7 @@ HSEP_API hsep_plan_status hsep_planner_advance(hsep_planner *self)
     return HSEP_PLAN_DONE;
 }
 
-/* Stop behind decided and shared coefficients, in place, (count,) m. */
+/* Stop after decided and shared coefficients, in place, (count,) m. */
 static void stop_behind(const hsep_stop *self, hsep_real c[])
 {
     const hsep_real *gains = hsep_at_const(self, self->gains);
@@ -544,7 +544,7 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     stop_behind(self, last);
     hsep_axpy(last, share, own, self->count);
     const hsep_int all = HSEP_N_DECIDED + splines->n, begin = first + self->shared;
-    for (hsep_int i = 0; i < all && length < 1.0; i++) { /* behind what the next plan shares of it the change fades */
+    for (hsep_int i = 0; i < all && length < 1.0; i++) { /* after what the next plan shares of it the change fades */
         const hsep_real gone = i > begin ? (hsep_real)(i - begin) / (hsep_real)(all - begin) : 0.0;
         const hsep_real left = 1.0 - gone * gone * gone;
         plan[i] = left * left * left * last[hsep_min(i, self->count - 1)];

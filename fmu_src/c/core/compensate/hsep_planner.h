@@ -28,7 +28,7 @@ typedef struct {
     hsep_int P;         /* triangle of n rows */
     hsep_int splines, interior;
     hsep_knots knots;  /* of changes of the last plan, */
-    hsep_knots solved; /* and those of this cost */
+    hsep_knots solved; /* and of this cost */
     hsep_int stop;     /* of plans that are longer than what is known; 0: none is */
 } hsep_planner;
 HSEP_ASSERT_WORDS(hsep_planner, 40);
@@ -78,7 +78,7 @@ static inline hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hse
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight);
 
-/* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline behind it,
+/* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline after it,
  * (preview,); target: x_d minus its response to x_d plus the decided part of delta, (preview,) m. */
 HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
 

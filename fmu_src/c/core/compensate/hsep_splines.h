@@ -222,7 +222,7 @@ static inline void hsep_splines_transpose(const hsep_splines *self, hsep_real ro
     }
 }
 
-/* sums, (HSEP_SPLINES_TOGETHER,): products of splines i, i + 1, ..., each with the one d behind; of sorted weights. */
+/* sums, (HSEP_SPLINES_TOGETHER,): products of splines i, i + 1, ..., each with the one d later; of sorted weights. */
 static inline void splines_products(
     const hsep_splines *self, const hsep_real sorted[], hsep_int i, hsep_int d, hsep_real sums[])
 {
@@ -411,14 +411,14 @@ static inline void hsep_knots_add(
     hsep_zero(work, self->n + 2 * HSEP_KNOTS_NEAR);
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_knot row = hsep_knots_at(self, i);
-        const hsep_int behind = row.begin + row.length + HSEP_KNOTS_NEAR;
+        const hsep_int after = row.begin + row.length + HSEP_KNOTS_NEAR;
         for (hsep_int k = 0; k < row.length; k++) { /* products of this spline with uniform ones */
             const hsep_real *of_uniform = products + HSEP_KNOTS_WIDTH * (row.begin + k);
             hsep_axpy(work + row.begin + k, row.share[k], of_uniform, HSEP_KNOTS_WIDTH);
         }
         for (hsep_int j = i; j < self->m; j++) {
             const hsep_knot column = hsep_knots_at(self, j);
-            if (column.begin < behind) {
+            if (column.begin < after) {
                 const hsep_real *of_column = work + HSEP_KNOTS_NEAR + column.begin;
                 triangle[j - i] += hsep_dot(column.share, of_column, column.length);
             } else {
