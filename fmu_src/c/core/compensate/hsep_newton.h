@@ -51,15 +51,15 @@ typedef struct {
     hsep_int of_physics;    /* (3 + n,) m, coefficients of the physics model's plan */
     hsep_int command;       /* (preview + late,) m, commands predicted last, relative to the start, newest first */
     hsep_int x_pb;          /* (preview + late,) m, their prediction by the physics model, */
-    hsep_int e_h;       /* (preview + late + p,) m, and what the averaged model adds; after it the last residuals */
-    hsep_int target;    /* (preview,) m, work */
-    hsep_int weight;    /* (preview,) of the errors of a plan: they count less at its end */
-    hsep_int corrected; /* (n,) m, what the averaged model's last plan changed the one before by; 0 of any other */
-    hsep_int begins;    /* (m,) hsep_int, samples that the splines begin with, which are solved for */
-    hsep_int shapes;    /* (HSEP_KNOTS_LEVELS, preview) splines of each distance of knots, */
-    hsep_int passed;    /* (HSEP_KNOTS_LEVELS, preview) and these after G_pb */
-    hsep_int gram;      /* triangle of m rows, W' W with G_pb only */
-    hsep_int W;         /* (m, preview) weighted changes of x_h by splines, 0 before they begin */
+    hsep_int e_h;           /* (preview + late + p,) m, and what the averaged model adds; after it the last residuals */
+    hsep_int target;        /* (preview,) m, work */
+    hsep_int weight;        /* (preview,) of the errors of a plan: they count less at its end */
+    hsep_int corrected;     /* (n,) m, what the averaged model's last plan changed the one before by; 0 of any other */
+    hsep_int begins;        /* (m,) hsep_int, samples that the splines begin with, which are solved for */
+    hsep_int shapes;        /* (HSEP_KNOTS_LEVELS, preview) splines of each distance of knots, */
+    hsep_int passed;        /* (HSEP_KNOTS_LEVELS, preview) and these after G_pb */
+    hsep_int gram;          /* triangle of m rows, W' W with G_pb only */
+    hsep_int W;             /* (m, preview) weighted changes of x_h by splines, 0 before they begin */
     hsep_int linearised;
     hsep_int physics; /* G_pb at the beginning of the window, */
     hsep_int trial;   /* and for a trial */
