@@ -358,7 +358,7 @@ static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, h
 {
     const hsep_int window = self->late + self->Np, beyond = self->preview - self->Np;
     const hsep_int variances = newton_parts(window - predicted, HSEP_NEWTON_VARIED) +
-                               newton_parts(behind, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) +
+                               newton_parts(beyond, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) +
                                newton_parts(window, HSEP_NEWTON_VARIED);
     const hsep_int of_physics =
         NEWTON_PASS + 2 * newton_of_half(self) * HSEP_NEWTON_PHYSICS_STEPS + 2 * NEWTON_PREDICTION;
