@@ -17,7 +17,7 @@ from typing import Any
 from docs.reference_pages import pages
 from hybridsep.base.parameters import Parameter
 from hybridsep.base.settings import PARAMETERS
-from hybridsep.compensate import newton, planning, qp, splines, stop
+from hybridsep.compensate import limits, newton, planning, qp, splines, stop
 from hybridsep.fmi.variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 from hybridsep.predict import uncertainty
 from hybridsep.predict.averaging import experts, features, model, recall, stacking, start
@@ -39,11 +39,12 @@ PREDICTIONS: Declared = {
     "recall": [recall],
     "averaging": [model],
 }
-"""Modules whose constants the C core has, those with a name of their own and a reason behind them, by C's prefix."""
+"""Modules whose constants the C core has, those with a name of their own and a reason after them, by C's prefix."""
 
 PLANS: Declared = {
     "splines": [splines],
     "qp": [qp],
+    "limits": [limits],
     "newton": [newton],
     "planning": [planning],
     "stop": [stop],
@@ -181,7 +182,7 @@ def _defines(declared: Declared) -> list[str]:
 
 
 def _declared(module: ModuleType) -> list[str]:
-    """Return the names of a module's constants that C has: with a reason, a comment or a text, behind them."""
+    """Return the names of a module's constants that C has: with a reason, a comment or a text, after them."""
     names: list[str] = []
     text = Path(module.__file__ or "").read_text(encoding="utf-8")
     lines = text.splitlines()

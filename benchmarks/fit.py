@@ -12,7 +12,7 @@ relative to the least of the eight others, their geometric means below the table
 
 An open benchmark: ``--method`` is one of your own, a class like :class:`Method`, whose RMS and largest error on the
 same samples are printed below each row, relative to the best of all others. It may see the first half of a log, and of
-the second each window behind its prediction. The logs are the recordings beside this file, or yours.
+the second each window after its prediction. The logs are the recordings beside this file, or yours.
 """
 
 import argparse

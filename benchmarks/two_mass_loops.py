@@ -47,7 +47,7 @@ def trajectory(recipe: Recipe) -> Array:
 
 
 def machine_of_drive(recipe: Recipe) -> Machine:
-    """Return a drive's physics model, and limits which leave something to those of its trajectory.
+    """Return a drive's physics model, and limits which leave something to its trajectory's.
 
     The settings are those that ``fit`` writes where it is given these limits, but for ``following_error_max``, which is
     off; the change may be twice the servo error.
@@ -79,7 +79,7 @@ def closed_loop(
     sensor: Sensor = lambda _k, x: x,
     **more: float,
 ) -> Run:
-    """Return a run of a drive, which may be another one than the recipe's, behind its machine's compensator.
+    """Return a run of a drive, which may be another one than the recipe's, with its machine's compensator.
 
     ``compensate``: {"off", "physics", "hybrid"}; ``sensor``: returns what is measured in the place of a measurement;
     ``**more``: parameters of the FMU besides.

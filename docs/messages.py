@@ -29,7 +29,7 @@ ERRORS: Mapping[str, Explanation] = {
     ),
     "SignalError": Explanation(
         "Samples cannot be used: NaN or infinite values, a wrong shape or length.",
-        "Give finite arrays of equal length. A missing measured position may be NaN with `averaging = true` alone.",
+        "Give finite arrays of equal length. A missing measured position may be NaN with `averaging = true` only.",
         ("must be finite",),
     ),
     "LogError": Explanation(

@@ -1,6 +1,6 @@
 """Calibration of the stage's friction ``f`` to the physics-only error that the paper prints.
 
-The modes are Table 1's and the ratio ``κ/f = 1.5e-3 mm⁻²`` is fixed; ``f`` alone is found, so that the
+The modes are Table 1's and the ratio ``κ/f = 1.5e-3 mm⁻²`` is fixed; only ``f`` is found, so that the
 physics-only RMS on the spiral, against the measured position, is 22.0 µm on X and 130.2 µm on Y. The results stand in
 ``models/als25010_*.toml``. With ``--assumptions`` (some minutes) the same is done for other spirals and ratios, which
 the paper does not print, to see how far the hybrid's gain depends on them.

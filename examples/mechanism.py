@@ -168,12 +168,12 @@ def innovation(e_pb: Array, recursion: Array, known: Array | None = None) -> Arr
 
 
 def squared_command(k: int, z: Array, x_d: float) -> float:
-    """Return the paper's example of eq. (7), ``x_d²``, m²: it depends on the input alone."""
+    """Return the paper's example of eq. (7), ``x_d²``, m²: it depends only on the input."""
     return x_d * x_d
 
 
 def coulomb(force: float, x_d: Array) -> Disturbance:
-    """Return friction of ``force`` N against the commanded motion ``x_d``, ``(n,)``: it depends on the input alone."""
+    """Return friction of ``force`` N against the commanded motion ``x_d``, ``(n,)``: it depends only on the input."""
     against = -force * np.sign(np.diff(x_d, append=2 * x_d[-1] - x_d[-2]))
     return lambda k, *_: float(against[k])
 

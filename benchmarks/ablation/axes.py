@@ -60,7 +60,7 @@ class Axis:
     x_d: Array  # (n,), m: commanded positions
     x: tuple[Array, Array]  # each (n,), m: measured positions of the cold run and of the warm one after it
     first: int  # first test sample
-    # whether the warm run is of the test samples alone, after one of the samples before them; else of all samples
+    # whether the warm run is of only the test samples, after one of the samples before them; else of all samples
     split: bool
     # m: RMS error over the test samples to which the errors of the cold run are relative; the warm run's are relative
     # to ``best_warm``

@@ -135,7 +135,7 @@ class ArmInMujoco:
             self._mujoco.mj_step(self._model, data)
 
     def load(self, commands: Array) -> Array:
-        """Return the torques on joints but for those of their own inertia, over stiffness, ``(n, joints)``, rad."""
+        """Return the torques on joints but for their own inertia's, over stiffness, ``(n, joints)``, rad."""
         model, data, torque = self._model, self._mujoco.MjData(self._model), np.empty_like(commands)
         velocity = np.gradient(commands, T_S, axis=0)
         acceleration = np.gradient(velocity, T_S, axis=0)

@@ -2,7 +2,7 @@
 
     python -m benchmarks.outside.belt [--Np 60]      (two minutes)
 
-Motor and arm are two masses, the belt a spring and damper between them; the drive's cascade sees the motor alone, a log
+Motor and arm are two masses, the belt a spring and damper between them; the drive's cascade sees only the motor, a log
 the arm. Friction is the LuGre model (C. Canudas de Wit and others, IEEE Trans. Autom. Control 40, 1995); the motor cogs
 200 and 100 times a turn; the weight changes with the angle. Nothing of it is a plant of the library. The model is
 ``hybridsep.fit``'s of a minute of the program, the test 20 s of another one. Largest and RMS of the arm's error, mdeg;

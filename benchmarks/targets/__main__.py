@@ -4,7 +4,7 @@
 
 Replays a run of the paper's drive, cold and warm, on each processor: x86-64 here, the others in qemu's emulation of
 whole machines without an operating system, so that the numbers depend on the compiler, its library of mathematics and
-the core alone. Instructions: x86-64 by callgrind; the others with qemu's -icount shift=0, by which an instruction takes
+only the core. Instructions: x86-64 by callgrind; the others with qemu's -icount shift=0, by which an instruction takes
 1 ns of the emulated clock, from the machine's own counter: the performance monitor's of the Cortex-A53, exactly; a
 timer at 25 MHz of the Cortex-M boards, to 40 instructions. An instruction is no cycle.
 

@@ -45,7 +45,7 @@ class Target:
         needed = [self.compiler[0], *self.emulator[:1], self.size_tool]
         lacking = [name for name in needed if not shutil.which(name)]
         if not lacking and self.script:
-            # Where picolibc is, its specifications alone know.
+            # Where picolibc is, only its specifications know.
             command = [*self.compiler, "-x", "c", "-", "-lm", "-o", os.devnull]
             tried = subprocess.run(
                 command,
@@ -158,7 +158,7 @@ def build(target: Target, case: Case, folder: Path, *, plain_math: bool = False,
     plain_math : bool
         Take exp, pow, tanh, sin and cos from plain_math.c instead of the target's libm.
     options : tuple of str
-        Of the compiler, behind the others.
+        Of the compiler, after the others.
     """
     folder.mkdir(parents=True)
     (folder / "case.h").write_text(header(case), encoding="utf-8")
@@ -177,7 +177,7 @@ def program(
 
 
 def sizes(target: Target, kind: str, folder: Path) -> Sizes:
-    """Return the sizes of the functions that a predictor or a compensator needs, linked alone."""
+    """Return the sizes of the functions that a predictor or a compensator needs, linked by itself."""
     folder.mkdir(parents=True)
     found = []
     for define in ([f"-DKIND={kind}"], []):
@@ -190,7 +190,7 @@ def sizes(target: Target, kind: str, folder: Path) -> Sizes:
 
 
 def _linked(target: Target) -> list[str]:
-    """Return the options of the linker, behind the sources."""
+    """Return the options of the linker, after the sources."""
     own = ["-nostartfiles", f"-T{HERE / target.script}"] if target.script else []
     return ["-Wl,--gc-sections", "-lm", *own]
 

@@ -97,7 +97,7 @@ HSEP_API size_t hsep_predictor_size(const hsep_parameters *parameters);
 /* Name of the first parameter for which that is 0, "modes" if there are none; NULL: none, or the block is too large. */
 HSEP_API const char *hsep_predictor_refused(const hsep_parameters *parameters);
 
-/* Begin with the drive at rest at start, m. weights: content of a file weights.bin in any alignment, so many bytes, as
+/* Begin with the drive at rest at start, m. weights: content of a file weights.bin, weights_size bytes, as
  * `hybridsep hal --weights` and an FMU's resources have it, or NULL: cold. Weights that are refused change nothing: the
  * block has begun cold. */
 HSEP_API hsep_began hsep_predictor_init(
@@ -111,7 +111,7 @@ HSEP_API void hsep_predictor_read(const hsep_predictor *self, hsep_predictor_out
 
 /* Write what was learned so far as a file weights.bin into bytes, (size,), aligned for double: hsep_*_init, FMUs and
  * the Python library of this version and later ones begin a run with it. parameters: as of hsep_*_init; in single
- * precision they are rounded, and fit a library in single precision alone. Returns the bytes of the file; nothing is
+ * precision they are rounded, and fit only a library in single precision. Returns the bytes of the file; nothing is
  * written where size is less, or bytes is NULL. No output changes by it. */
 HSEP_API size_t
 hsep_predictor_weights(hsep_predictor *self, const hsep_parameters *parameters, void *bytes, size_t size);

@@ -36,7 +36,7 @@ _ARGUMENTS = {
     "fit": ("my_axis.csv --Np 100", "my_axis.csv --unit mm --v_max 0.25 --a_max 20 --j_max 1e4"),
     "init": ("machine.toml", "--force"),
     "demo": ("--out demo", "--out demo --force"),
-    "build": ("{m} --out dist", "HybridPredictor_my_axis {m} --weights my_axis/trained.state"),
+    "build": ("{m} --out dist", "HybridPredictor_my_axis {m} --weights my_axis/trained.state --out warm"),
     "cosim": ("{m} --compensate hybrid", "x/machine.toml y/machine.toml --path part.ngc --figure part.png"),
     "system": ("{m} --compensate hybrid", "--ssp 2 --target host"),
     "backtest": (
@@ -44,7 +44,10 @@ _ARGUMENTS = {
         "my_axis.csv {m} --report today.html --save trained.state",
     ),
     "hal": ("my_axis/machine.toml --out hal", "x/machine.toml y/machine.toml --out hal"),
-    "header": ("my_axis/machine.toml --predictor", "my_axis/machine.toml --predictor --weights my_axis/trained.state"),
+    "header": (
+        "my_axis/machine.toml --predictor",
+        "my_axis/machine.toml --predictor --weights my_axis/trained.state --force",
+    ),
     "example-log": ("--out my_axis.csv", "--out my_axis.csv.gz"),
 }
 EXAMPLES = {

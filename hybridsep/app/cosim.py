@@ -98,7 +98,7 @@ def cosim(
         if predictor is None and compensate not in (None, "off"):
             settings = replace(axis.compensator_settings, compensate=compensate)
             limits = limits_that_bind(run.x_d, run.x_dm, run.T_s, settings)
-            trial = Trial(axis, None if weights else controller)  # with weights it has their p and q alone
+            trial = Trial(axis, None if weights else controller)  # with weights it has only their p and q
             if limits and (stretch := Stretch.of(trial, [Recording(run.x_d, run.x, 0)])):
                 advance("what limits cost", 0.0)
                 costs = stretch.limit_costs()

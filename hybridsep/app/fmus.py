@@ -150,7 +150,7 @@ def hal(
         "linuxcnc"
     ),
     predictor: Annotated[
-        bool, typer.Option("--predictor", help="The component that predicts alone; it needs no limits of the drive.")
+        bool, typer.Option("--predictor", help="The component that only predicts; it needs no limits of the drive.")
     ] = False,
     weights: options.WeightsOption = None,
     force: options.ForceOption = False,
@@ -205,7 +205,7 @@ def header(
     machine: Annotated[str, typer.Argument(help="Machine file (.toml) or name.")],
     out: Annotated[Path | None, typer.Option(help="The header; named after the machine if left out.")] = None,
     predictor: Annotated[
-        bool, typer.Option("--predictor", help="Of the predictor alone; it needs no limits of the drive.")
+        bool, typer.Option("--predictor", help="Of the predictor only; it needs no limits of the drive.")
     ] = False,
     weights: options.WeightsOption = None,
     force: options.ForceOption = False,

@@ -139,7 +139,7 @@ def read_checked(path: Path, reading: options.ReadingOptions, machine: Machine) 
     if not machine.predictor_settings.averaging and np.isnan(log.x_meas).any():
         first = int(np.argmax(np.isnan(log.x_meas)))
         raise LogError(
-            f"{path}: measured position {first + 1} is missing; it is replayed with averaging alone "
+            f"{path}: measured position {first + 1} is missing; it is replayed with averaging only "
             "(--set predictor.averaging=true)"
         )
     findings = checked(log)

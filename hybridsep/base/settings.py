@@ -18,7 +18,7 @@ from typing import Any, ClassVar, TypeVar
 from .errors import ParameterError, brief
 from .parameters import Parameter, choice, flag, real, whole
 
-_SPLINES = 120  # largest length of a plan that goes on behind the preview, in spacings: its solver's work is their cube
+_SPLINES = 120  # largest length of a plan that goes on after the preview, in spacings: its solver's work is their cube
 _PLAN_MAX = 2000  # longest plan, samples
 
 PLAN_END = 3  # samples without change at the end of a compensator's plan, so that the third difference is zero after it
@@ -267,9 +267,9 @@ class CompensatorSettings(Settings):
     (:meth:`~hybridsep.model.physics.ModalModel.look_ahead`), ``spacing`` a hundredth of a plan, or a smaller divisor
     of ``Np``. The differences of ``x_dm`` keep the drive's ``limits``, if there are any; where those of ``x_d`` do not,
     by what these take more. ``no_reversal`` has no effect without them; with ``averaging`` it bounds the physics
-    model's plan in the hybrid's stead alone. ``change_max``, None for no bound, is about twice the servo error
+    model's plan only in the hybrid's stead. ``change_max``, None for no bound, is about twice the servo error
     without compensation; ``following_error_max`` about 1.3 times the largest one
-    (:class:`~hybridsep.online.look_ahead.Monitor`). With ``averaging`` a hybrid plan of motion more than 1.25 times as
+    (:class:`~hybridsep.online.monitor.Monitor`). With ``averaging`` a hybrid plan of motion more than 1.25 times as
     fast as what was learned changes the command by at most half of ``change_max``, and so does the physics model's,
     unless weights of earlier runs judge it.
     """
@@ -316,7 +316,7 @@ class CompensatorSettings(Settings):
         nonzero=1e-5,
     )
     horizon: int | None = whole(
-        *(0, 0, _PLAN_MAX, "samples of a plan: behind the preview the command is taken to go on at its last velocity"),
+        *(0, 0, _PLAN_MAX, "samples of a plan: after the preview the command is taken to go on at its last velocity"),
         unless_given=None,
     )
 
@@ -371,7 +371,7 @@ class CompensatorSettings(Settings):
             problems.append(f"preview must be ≥ Np + 4·spacing + {PLAN_END} = {least}, got {preview}")
         if problems:
             raise ParameterError("; ".join(problems))
-        # Behind the window, and what the next one leaves as it is, a stop has to fit into the preview
+        # After the window, and what the next one leaves as it is, a stop has to fit into the preview
         fits = preview >= Np + Np // 2 + 5 * spacing + PLAN_END
         horizon = min(self.plan(look_ahead, T_s), _SPLINES * spacing) if self.horizon is None else self.horizon
         return replace(self, spacing=spacing, preview=preview, horizon=max(preview, horizon if fits else 0))

@@ -9,7 +9,7 @@ samples only the splines that begin in the first window are applied, then the ne
 Position, velocity and acceleration of ``δ`` are continuous by construction, also between windows and between models.
 Every spline ends within its plan, so a plan returns to ``x_d`` at its end, where its error counts least, and its
 remainder keeps the limits. The next plan starts from that remainder: there is always a feasible plan, and where no
-other can be computed the remainder is followed. Where the preview is shorter than the drive needs, plans go on behind
+other can be computed the remainder is followed. Where the preview is shorter than the drive needs, plans go on after
 it, and what is carried out of them has a stop within the limits (:mod:`~hybridsep.compensate.stop`).
 """
 
@@ -25,11 +25,12 @@ from ..base.settings import CompensatorSettings, samples_before
 from ..base.signals import as_measured, as_published, as_samples
 from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..base.threads import one_blas_thread
-from ..online.look_ahead import LookAhead, Monitor, PublishedWindow, SepState
+from ..online.look_ahead import LookAhead, PublishedWindow, SepState
+from ..online.monitor import Monitor
 from ..predict.averaging.features import Disturbance
 from ..predict.predictor import HybridPredictor
+from .limits import DriveBounds
 from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
-from .qp import DriveBounds
 from .splines import N_DECIDED, SplineBasis
 from .stop import Stop
 
@@ -77,13 +78,9 @@ class SepCompensator:
         self.preview, self.spacing, self.horizon = settings.preview, settings.spacing, settings.horizon
         predictor.plan_ahead(self.preview)
         self._basis = SplineBasis(self.horizon, self.spacing, Np)
-        bounds = self._bounds(settings)
-        self._planning: Planning
-        if predictor.settings.averaging:
-            self._planning = AveragedPlanning(self._basis, bounds, settings, Np)
-        else:
-            self._planning = PaperPlanning(self._basis, bounds, settings, Np)
-        self._stop = self._stop_within(bounds)
+        planning = AveragedPlanning if predictor.settings.averaging else PaperPlanning
+        self._planning: Planning = planning(self._basis, self._bounds(settings), settings, Np)
+        self._stop = self._stop_within(self._planning.bounds)
         self.restart(predictor.start, t_init=predictor.settings.warm_up)
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:

@@ -30,7 +30,8 @@ from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, SolvedExpert
 from ..predict.averaging.features import N_FRICTION, N_LASTING, N_SPANS, N_STOPS, StaticFeatures, StaticState
 from ..predict.averaging.model import AveragedForecast, AveragedModel
 from ..predict.window import ResidualWindow
-from .qp import Bounds, Tolerance, solve_change
+from .limits import Bounds
+from .qp import Tolerance, solve_change
 from .splines import N_DECIDED, PlanCost, SplineBasis
 
 _OWN_REACH = 1e-3
@@ -38,7 +39,7 @@ _OWN_REACH = 1e-3
 the friction's is the tangent."""
 
 
-_APART = 4  # samples behind the window that share the variance of the first one's features
+_APART = 4  # samples after the window that share the variance of the first one's features
 
 
 class DisturbanceSlopes(NamedTuple):
@@ -51,8 +52,8 @@ class DisturbanceSlopes(NamedTuple):
     of_position: Array  # (n, n_disturbances − N_LASTING), 1/m: of all others with ``x``
     of_velocity: Array  # (n, n_own), s/m: of the user's own, the last ones, with the commanded velocity
 
-    def behind(self, n: int) -> "DisturbanceSlopes":
-        """Return the slopes behind the first ``n`` samples."""
+    def after(self, n: int) -> "DisturbanceSlopes":
+        """Return the slopes after the first ``n`` samples."""
         return DisturbanceSlopes(*(one[n:] for one in self))
 
     def change(self, weights: Array, velocity: Array, moved: Array, moved_velocity: Array) -> Array:
@@ -93,8 +94,8 @@ class PlanModel:
         self.scales, of_physics = model.scales_of(window)
         self._solved = model.solved(self.scales)
         counts = np.arange(len(late) + len(x_d))
-        behind = counts[len(late) + model.settings.Np :]
-        behind -= np.arange(len(behind)) % _APART
+        beyond = counts[len(late) + model.settings.Np :]
+        beyond -= np.arange(len(beyond)) % _APART
         # Prediction under ``x_d``, whose variances all others have.
         self.of_previous_plan = model.forecast_by(
             *(self._solved, window, self.scales), counts=counts, of_physics=of_physics
@@ -117,7 +118,7 @@ class PlanModel:
         return self._model.doubts
 
     def outgrows(self, factor: float) -> bool:
-        """Return whether the unmodified commands, and the physics model behind them, are faster than what is learned.
+        """Return whether the unmodified commands, and the physics model under them, are faster than what is learned.
 
         They are, if they exceed the fastest motion that was learned by ``factor``. Both count, as commands may have
         corners that no drive follows, and a model may overshoot them.
@@ -149,7 +150,7 @@ class PlanModel:
         """
         n_late, weights = len(self._late), at.shares.tolist()
         over_all = slopes_of(self._static, self._model.run.static, at.window, at.x, self.scales.velocity, reach)
-        slopes = over_all.behind(n_late)
+        slopes = over_all.after(n_late)
         total: Array = passed.copy()
         for expert, one in self._solved.items():
             weight = weights[expert.place]
@@ -201,7 +202,7 @@ def _recur(solved: SolvedExpert, drive: Array) -> Array:
 def slopes_of(
     static: StaticFeatures, state: StaticState, window: ResidualWindow, x: Array, velocity_scale: float, reach: float
 ) -> DisturbanceSlopes:
-    """Return the slopes of the disturbances of a window; other parameters as those of :meth:`StaticFeatures.rows`.
+    """Return the slopes of the disturbances of a window; other parameters as of :meth:`StaticFeatures.rows`.
 
     ``reach``: half of the change of velocity that the friction's slope is taken over, relative to the velocity scale;
     0: the tangent.
@@ -246,7 +247,7 @@ be the same step."""
 
 TWICE, THRICE = 15, 5
 """Samples that a plan has from which on it makes two Newton steps, and windows in a plan below which it makes three: a
-sample is planned in so many. In windows of 50 of 200 one step leaves fifteen times the error of two on the stage's X
+sample is planned in that many. In windows of 50 of 200 one step leaves fifteen times the error of two on the stage's X
 axis, warm, and on its Y axis two leave three times the error of three; in windows of 20 one leaves as much as two."""
 
 PHYSICS_STEPS = 3  # of the solver, for the physics model's plan that Newton steps are compared with
@@ -267,7 +268,7 @@ class PlannedPoint:
     """Plan with what the model predicts under it."""
 
     coefficients: Array  # (3 + n_free,), m
-    prediction: AveragedForecast
+    prediction: AveragedForecast  # under the plan, of the residual
     x_h: Array  # (preview,), m, relative to the start
     third: Array  # (preview,), m, third differences of δ
     cost: float  # m²
@@ -279,7 +280,7 @@ class AveragedPlanner:
 
     basis: SplineBasis
     splines: Array  # (n_free, m): those that are solved for, as sums of the free ones (``splines.solved_splines``)
-    jerk_weight: float
+    jerk_weight: float  # as of :class:`~hybridsep.base.settings.CompensatorSettings`
     model: PlanModel  # of the plan that the window begins
     x_d: Array  # (preview,), m: commanded positions, relative to the start
     delta_before: Array  # (3,), m: last three values of δ
@@ -295,7 +296,7 @@ class AveragedPlanner:
         return PlannedPoint(coefficients, at, x_h, third, cost)
 
     def step(self, start: PlannedPoint, bounds: Bounds, passed: Array, reach: float) -> tuple[PlannedPoint, float]:
-        """Return the plan behind a Newton step, the start itself if none is better, and the reach of the next step.
+        """Return the plan after a Newton step, the start itself if none is better, and the reach of the next step.
 
         ``start``: where the model is linearised; ``bounds``: on coefficients; ``passed``: (preview, n_free): free
         splines filtered by ``G_pb``; ``reach``: of friction's slope, as of :meth:`PlanModel.slope`.

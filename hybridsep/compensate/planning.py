@@ -1,11 +1,9 @@
 """Planning: how the plan of a window is chosen and published, with the paper's model and with the averaged one.
 
 With the paper's model a plan is on eq. (3), and on the physics model where the paper's has none. The averaged one, as
-soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan. Where
-compensation is switched off, or has tripped, a plan ends it. It weighs its experts by their errors in the
-window and half a plan ahead, so that the expert of the next 20 ms does not plan what comes after them. Of what its own
-plan changes a share is taken: less where it takes back what the last one has changed, or gains little beside the
-variance of predictions. A motion faster than all of its run is compensated with half of the largest change at most.
+soon as it has learned, judges all plans: its own, the physics model's, and the remainder of the last plan; by experts
+that are weighed by their errors in the window and half a plan ahead, as who is right for 20 ms may not be so later.
+Where compensation is switched off, or has tripped, a plan ends it.
 """
 
 import math
@@ -23,13 +21,14 @@ from ..predict.averaging.experts import EXPERTS
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
+from .limits import Bounds, DriveBounds
 from .newton import FIRST_REACH, PHYSICS_STEPS, THRICE, TOLERANCE, TWICE, AveragedPlanner, PlanModel, is_better
-from .qp import EXACT, Bounds, DriveBounds, Tolerance, solve, solve_change
+from .qp import EXACT, Tolerance, solve, solve_change
 from .splines import N_DECIDED, SplineBasis, solved_splines
 
 _ENDS, _NEW = 5.0, 1e9
 """Periods in a plan of the change whose jerk weighs as much as the change itself in a plan that ends compensation; and
-the factor of what it may be behind the last plan, so that it is nothing there and ends as soon as the remainder."""
+the factor of what it may be after the last plan, so that it is nothing there and ends as soon as the remainder."""
 
 
 @dataclass(frozen=True)
@@ -152,8 +151,10 @@ class Planning(ABC):
         """Return the coefficients, ``(3 + n_free,)``, m, of a plan that ends compensation, smoothly and soon.
 
         It has the least change of the command that its jerk and the drive's limits allow, and ends where the last plan
-        does; where there is none, the remainder of that goes on.
+        does. Where there is none, or the last plan was one, the remainder of that goes on.
         """
+        if preview.state_before is SepState.OFF:
+            return preview.previous_plan
         decided, last = np.split(preview.previous_plan, [N_DECIDED])
         at_once, nothing = np.eye(1, self.horizon)[0], np.zeros(self.horizon)
         jerk_weight = (2.0 * math.sin(math.pi * _ENDS / self.horizon)) ** -6.0
@@ -164,10 +165,6 @@ class Planning(ABC):
         cost.P[new, new] *= _NEW
         found = solve_change(cost, self.limits(preview), preview.previous_plan, not_pinned, self.SOLVED)
         return preview.previous_plan if found is None else found
-
-    def without_model(self, preview: Preview) -> Array:
-        """Return the coefficients where no model may plan: of :meth:`ending` at first, then of its remainder."""
-        return preview.previous_plan if preview.state_before is SepState.OFF else self.ending(preview)
 
     def limits(self, preview: Preview, *, may_turn: bool = False, change: float = 1.0) -> Bounds:
         """Return the drive's limits on the coefficients of a plan, and a share of the largest change."""
@@ -188,7 +185,7 @@ class PaperPlanning(Planning):
     def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
         """Return the plan of the best model that has one, else one without a model."""
         if most is SepState.OFF:
-            return ChosenPlan(SepState.OFF, self.without_model(preview), None)
+            return ChosenPlan(SepState.OFF, self.ending(preview), None)
         learned = predictor.k >= predictor.n_init and predictor.regression.n_rows > 0
         hybrid = most is SepState.HYBRID and learned and has_stable_poles(predictor.residual.lag_weights)
         bounds = self.limits(preview)
@@ -239,7 +236,7 @@ may change it by all of ``change_max`` where weights of earlier runs judge it.""
 
 _TAKEN_BACK, _LEAST_SHARE, _NEAR = 0.2, 0.7, 4
 """A plan takes a share of its change of the last one, which grows or falls by the first times the cosine between what
-it changes and what the last plan has changed, up to 1 and down to the second. Both are taken over so many windows. A
+it changes and what the last plan has changed, up to 1 and down to the second. Both are taken over this many windows. A
 new plan corrects what was measured last; where a drive is too slow for that, or the model wrong at a frequency, the
 next one takes back what this one has corrected, and the command swings from window to window, also at rest."""
 
@@ -286,7 +283,7 @@ class AveragedPlanning(Planning):
         scales = model.scales  # of the remainder of the last plan
         self.ahead[-1] = np.nan
         if most is SepState.OFF:
-            return ChosenPlan(SepState.OFF, self.without_model(preview), scales)
+            return ChosenPlan(SepState.OFF, self.ending(preview), scales)
         g, free = predictor.physics_operator(self.horizon)
         change = _UNPROVEN if model.outgrows(FASTER) else 1.0
         of_physics_change = 1.0 if model.is_trained else change

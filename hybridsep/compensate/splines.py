@@ -33,8 +33,8 @@ _RIDGE = 1e-12
 def solved_splines(n: int, window: int) -> Array:
     """Return the splines that a plan of the averaged model is solved for, ``(n, m)``, as sums of ``n`` free ones.
 
-    Those of the first two windows, in which the plan acts or is pinned next, are free ones; behind them knots are
-    twice, and behind four windows four times as far apart. What is planned there is planned again, with closer knots,
+    The splines of the first two windows, in which the plan acts or is pinned next, are free ones; after them knots are
+    twice, and after four windows four times as far apart. What is planned there is planned again, with closer knots,
     before it acts, and goes on as it is until then: a plan changes the last one by these splines.
 
     ``n``: splines that a plan may change, from the first one that is not pinned on; ``window``: splines that begin in a

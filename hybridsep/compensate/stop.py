@@ -1,7 +1,7 @@
 """Plans beyond what is known of the command, and the stops that keep the drive's limits whatever comes.
 
 A plan may need more of the command than a controller knows ahead: an axis that lags gets the change that it needs only
-where the plan need not be back at ``x_d`` soon. So behind the known preview a plan takes the command to go on at its
+where the plan need not be back at ``x_d`` soon. So after the known preview a plan takes the command to go on at its
 last velocity, up to its ``horizon``. What comes may be another command. Beside each plan there is therefore a *stop*:
 it shares with the plan the coefficients that are carried out before the next one, and then brings the change of the
 command to a constant within the known preview. A constant change takes nothing of the limits of any command that
@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.settings import PLAN_END
 from ..base.signals import Array
-from .qp import ROUNDING, DriveBounds
+from .limits import ROUNDING, DriveBounds
 from .splines import N_DECIDED, SplineBasis
 
 _TRIES = 12
@@ -39,7 +39,7 @@ class Stop:
         shared, last = N_DECIDED + self.n_shared, N_DECIDED + (preview - PLAN_END) // basis.spacing - 2
         held = np.tri(self.n + 3, last)
         steps = np.diff(np.eye(shared), axis=0, prepend=0.0)  # of the coefficients: they are well conditioned
-        # The least sum of squares of the differences of orders 1 to 3, in limits, behind what is shared
+        # The least sum of squares of the differences of orders 1 to 3, in limits, after what is shared
         weights = enumerate(bounds.shares(basis.spacing), start=1)
         least = np.concatenate([share * np.diff(held, order, axis=0)[shared - order :] for order, share in weights])
         tail = -np.linalg.lstsq(least[:, shared:], least[:, :shared] @ steps, rcond=None)[0]
@@ -71,7 +71,7 @@ class Stop:
         stop = self._stopping @ shared + share * (old - self._stopping @ old[:n])
         if length == 1.0:
             return plan, stop
-        # Behind what the next plan shares of it, too, the change fades, and ends with the plan
+        # After what the next plan shares of it, too, the change fades, and ends with the plan
         begin, end = n + self.n_shared, len(plan)
         gone = np.maximum(np.arange(end) - begin, 0) / max(end - begin, 1)
         return (1.0 - gone**3) ** 3 * stop[np.minimum(np.arange(end), self.n - 1)], stop

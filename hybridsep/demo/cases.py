@@ -175,9 +175,9 @@ def compensation_table(summary: Summary) -> Table:
     contour = "; contour: X and Y" if "spiral_x" in summary else ""
     return Table(
         "Compensation: tracking error, RMS and largest in µm of the true position",
-        f"off: not compensated; cold: learns in this run; warm: weights of an earlier run; fir inverse: a filter "
+        f"off: not compensated; cold: learns in this run; warm: weights of an earlier run; FIR inverse: a filter "
         f"of the command, fitted to the run off{contour}; {_seeds(summary)}",
-        tuple(kind.replace("_", " ") for kind in kinds),
+        tuple(kind.replace("fir_", "FIR ").replace("_", " ") for kind in kinds),
         rows,
     )
 

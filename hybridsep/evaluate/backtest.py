@@ -100,7 +100,7 @@ def backtest(
         It learns the log on the way.
     x_d, x_meas : (n,) array_like, m
         Commanded and measured positions, ``n ≥ 1``; with averaging ``x_meas`` is NaN where it is missing. Or a
-        :class:`~hybridsep.logs.log.Log` alone, which has both, and its segments, or a table that is read as one. Arrays
+        :class:`~hybridsep.logs.log.Log`, which has both, and its segments, or a table that is read as one. Arrays
         in another unit are a log of :func:`~hybridsep.logs.log.read_log`.
     starts : sequence of whole numbers
         First samples of the segments, which gaps separate: another run begins with each, and what was learned is kept.

@@ -127,7 +127,7 @@ def _draw_windows(axes: Axes, run: Run, scale: float, unit: str) -> None:
 def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path, shown: DisplayUnits | None = None) -> None:
     """Draw command, tracking error and change of the command of runs over the same command to a PNG.
 
-    They are by the keys of :data:`CASES`; others are left out. Of one run alone, the spans are shaded that a lesser
+    They are by the keys of :data:`CASES`; others are left out. Of a single run, the spans are shaded that a lesser
     model planned. Positions are in the units ``shown``, mm and µm if left out.
     """
     shown, runs = shown or shown_in("m"), {key: run for key, run in runs.items() if key in CASES}
@@ -154,7 +154,7 @@ def tracking_figure(runs: Mapping[str, Run], title: str, path: str | Path, shown
 
 
 def _draw_runs(axes: Axes, runs: Mapping[str, Run], signal: str, shown: tuple[float, str], what: str) -> None:
-    """Draw a signal of each run in a unit, of which so many are one m or rad, labelled with its tracking error."""
+    """Draw a signal of each run in a unit, ``shown``: scale and name, labelled with its tracking error."""
     scale, unit = shown
     for key, run in runs.items():
         label, color = CASES[key]

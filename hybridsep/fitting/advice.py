@@ -89,7 +89,7 @@ def settling_words(replayed: Replay) -> str:
 def advice_on(judged: Judged) -> str:
     """Return what to do, in words; with caution where there are few test windows.
 
-    The hybrid is recommended where it is better than each of physics model, hold and peers alone.
+    The hybrid is recommended where it is better than each of physics model, hold and peers.
     """
     if judged.known:
         return _KNOWN
@@ -107,7 +107,7 @@ def advice_on(judged: Judged) -> str:
     peer = _IN_WORDS.get(best.name, best.name)
     if best.rms < judged.replay.least:
         return f"There is nothing to gain in {judged.part}: the log's resolution does not show the error of {peer}."
-    ratio, the = hybrid.rms / best.rms, "the hybrid (which alone began trained)" if judged.warm else "the hybrid"
+    ratio, the = hybrid.rms / best.rms, "the hybrid (the only one that began trained)" if judged.warm else "the hybrid"
     if n < WINDOWS_ENOUGH or judged.unidentified:
         how = "better than" if ratio < 1.0 - ALIKE else "worse than" if ratio > 1.0 + ALIKE else "as good as"
         but = f"but judged by {counted(n)} only: {_enough(judged)}"

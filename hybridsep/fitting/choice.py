@@ -26,11 +26,11 @@ _GAIN = 0.9  # ratio of the errors with and without a period below which it is w
 
 @dataclass(frozen=True)
 class Tried:
-    """Settings that were tried: lags, and RMS of the hybrid as of :func:`_trained_rms`, m, infinite if it diverged."""
+    """Settings that were tried."""
 
-    p: int
+    p: int  # lags
     q: int
-    rms_h: float
+    rms_h: float  # RMS of the hybrid as of :func:`_trained_rms`, m, infinite if it diverged
     chosen: bool
 
 

@@ -47,7 +47,7 @@ LIMITS_WORDS = (  # what the limits of :func:`estimated_limits` are
 _SCALE = 0.05
 """Velocity scale of what a compensator begins with, relative to the largest velocity of a log. A log's first motion may
 be ten times as fast: then no stop operator is as short as a belt's friction before sliding, and a warm loop has 1.16
-times the error of a cold one instead of 0.97. Predictions alone are 2 % worse with it on recorded axes."""
+times the error of a cold one instead of 0.97. Mere predictions are 2 % worse with it on recorded axes."""
 
 FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to say what it costs
 _GAIN = 0.05  # relative gain from which on a limit twice as large, or a longer look-ahead, is advised
@@ -188,8 +188,8 @@ class LookAheads:
     chosen: int  # preview of the machine, samples
     off: float  # RMS of the error without compensation, m
     duration: float  # of the stretch, s
-    T_s: float
-    is_rough: bool = False  # whether the command's own jerk is above its limit: plans behind a preview may run away
+    T_s: float  # s
+    is_rough: bool = False  # whether the command's own jerk is above its limit: plans past a preview may run away
 
     def figures(self, shown: DisplayUnits) -> tuple[str, list[str], list[list[str]]]:
         """Return title, head and rows of a table."""
@@ -203,7 +203,7 @@ class LookAheads:
             binds = ["look-ahead"] if self.longer(one) else []
             binds += [*one.settings, *(f"{name} {100 * share:.2g} %" for name, share in one.limits.items())]
             name = f"{1e3 * one.preview * self.T_s:.4g}{', chosen' if one.preview == self.chosen else ''}"
-            sizes = f"{factor * one.left:.4g}", f"{one.left / self.off:.3f}"
+            sizes = f"{factor * one.left:.4g}", f"{one.left / self.off:.2g}"
             rows.append([name, *sizes, ", ".join(binds) or "nothing"])
         return title, ["ahead [ms]", f"RMS [{unit}]", "× off", "what binds"], rows
 
@@ -264,7 +264,7 @@ class Tracking:
     motion: Mapping[str, Sequence[float]]  # name of a limit → largest of the logs' commands, and the drive's, SI
     held: int  # samples for which each command is the same
     rounding: float  # step of the commands, m
-    T_s: float
+    T_s: float  # s
     look_aheads: LookAheads | None  # None where the model has no error to compensate
 
     def lines(self, shown: DisplayUnits) -> list[str]:

@@ -47,11 +47,11 @@ def limits_that_bind(x_d: Array, x_dm: Array, T_s: float, settings: CompensatorS
 
 
 class Expected(NamedTuple):
-    """Commanded minus measured position without and with compensation, and the commands of the latter, ``(n,)``, m."""
+    """Errors without and with compensation, and the commands of the latter."""
 
-    without: Array
+    without: Array  # (n,), m: commanded minus measured position, as the next
     compensated: Array
-    x_d: Array
+    x_d: Array  # (n,), m: commanded position, and the modified one
     x_dm: Array
 
 
@@ -99,7 +99,7 @@ class Trial:
             residual = x[late:] - discrete.forced_response(discrete.rest(), x_d - start)[0][:n] - start
             at_rest = np.append(residual[~np.isnan(residual)], 0.0)[0]
             residual = np.pad(residual, (delay, late), constant_values=(at_rest, 0.0))
-            # Behind its end the command goes on, as plans would see a stop in it that never comes
+            # After its end the command goes on, as plans would see a stop in it that never comes
             further = x_d[-1] + np.diff(x_d[-2:]).sum() * np.arange(1, delay + 1)
             command, drive, on_the_way = np.append(x_d, further), discrete.stepper(), deque([start] * late)
             x_dm, true = np.empty((2, delay + len(x_d)))

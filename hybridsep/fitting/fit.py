@@ -260,7 +260,7 @@ def fit(
     Parameters
     ----------
     x_d, x : (n,) array_like
-        Commanded and measured positions; ``x`` is NaN where it is missing. Or alone: a table with these columns, or
+        Commanded and measured positions; ``x`` is NaN where it is missing. Or a single table with these columns, or
         with others that ``columns`` names; a :class:`~hybridsep.logs.log.Log`, or several of one axis.
     T_s, unit, columns, axis
         Of arrays and of a table, as of :func:`~hybridsep.logs.log.read_log`: sampling interval, s, unit of the

@@ -64,9 +64,9 @@ class IdentifiedPlant:
 
 class _Disturbed(NamedTuple):
     model: ModalModel
-    f: float
-    kappa: float
-    v_friction: float
+    f: float  # friction, as an offset of the command, m
+    kappa: float  # stiffness, κ x |x| as an offset of the command, 1/m
+    v_friction: float  # velocity of the friction's change of sign, m/s
 
     def entries(self) -> dict[str, Any]:
         """Return the entries of the section ``[plant]``."""

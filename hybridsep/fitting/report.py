@@ -169,8 +169,7 @@ def write_settings(report: Report, choice: Sequence[Tried], judged: Judged) -> N
 
 
 def _write_time(report: Report, judged: Judged) -> None:
-    scale, unit = judged.unit
-    replay = judged.replay
+    (scale, unit), replay = judged.unit, judged.replay
     errors, std = scale * replay.errors(), scale * replay.joined("x_h_std")
     t = judged.T_s * np.arange(errors.shape[1])
     factor, position = judged.shown.position
@@ -196,8 +195,7 @@ def _write_horizon(report: Report, judged: Judged) -> None:
     horizon = scale * judged.replay.horizon()
     ahead = 1e3 * judged.T_s * np.arange(1, judged.replay.Np + 1)
     lines = [Line(name, ahead, row, colour) for name, row, colour in zip(_NAMES, horizon, _COLOURS, strict=True)]
-    how = "How the error grows from the window's first sample on."
-    report.chart(Chart("ahead [ms]", (f"RMS error [{unit}]",), lines, how))
+    report.chart(Chart("ahead [ms]", (f"RMS error [{unit}]",), lines, "How the error grows within the window."))
 
 
 def _write_spectra(report: Report, judged: Judged) -> None:

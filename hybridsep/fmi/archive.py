@@ -96,7 +96,7 @@ def build_fmu(
 
 
 def archived(files: Mapping[str, bytes]) -> bytes:
-    """Return a zip of files, archive name → content, whose bytes depend on them, and on the zlib of this Python, alone.
+    """Return a zip of files, archive name → content, whose bytes depend only on them, and on the zlib of this Python.
 
     What readers that stream look for comes first.
     """

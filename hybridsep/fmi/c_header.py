@@ -48,8 +48,8 @@ class _Layout:
     """The parts of an FMU's table: single variables, the modes' variables, more single ones, then windows."""
 
     scalars: tuple[Variable, ...]
-    modes: tuple[Variable, ...]
-    last: tuple[Variable, ...]
+    modes: tuple[Variable, ...]  # four numbers of each
+    last: tuple[Variable, ...]  # what was added since
     windows: tuple[tuple[Variable, ...], ...]  # the samples of each window, all windows of one length
 
     @property
@@ -177,7 +177,7 @@ def _interface(kind: str) -> str:
 #define HSEP_N_INTERPOLATED {len(slopes)} /* the first variables, inputs with a time derivative */
 #define HSEP_N_SCALARS {len(layout.scalars)}
 #define HSEP_HAS_MODES {int(bool(layout.modes))}
-#define HSEP_N_LAST {len(layout.last)} /* single variables behind the modes */
+#define HSEP_N_LAST {len(layout.last)} /* single variables after the modes */
 #define HSEP_N_WINDOWS {len(windows)}
 #define HSEP_VR_LENGTH {"HSEP_VR_Np" if windows else 0} /* of the samples in each window, where there are some */
 
@@ -238,7 +238,7 @@ def c_sources(versions: Collection[str] = FMI_VERSIONS) -> dict[str, bytes]:
 def all_c(files: Sequence[str]) -> str:
     """Return the C file that includes all others, in which only the FMI functions have external linkage."""
     includes = "".join(f'#include "{file}"\n' for file in files)
-    return f"""/* The whole FMU as one translation unit: compile this file alone, with your FMI headers. */
+    return f"""/* The whole FMU as one translation unit: compile only this file, with your FMI headers. */
 #define HSEP_API static inline /* see hsep_api.h */
 
 {includes}"""

@@ -43,7 +43,7 @@ numbers. An overflow of an array on the stack ends the process before the functi
 class _Target:
     triple: str  # zig's name of it
     folder: str  # where importers of FMI 2.0 look for the library, below ``binaries/``
-    suffix: str
+    suffix: str  # of the library's name
     flags: tuple[str, ...] = ()  # options besides :data:`FLAGS`
 
 

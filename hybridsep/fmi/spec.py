@@ -122,7 +122,7 @@ def fmu_name(model: str, machine: str, flavour: str = FLAVOURS[0], fmi: str = FM
     if fmi not in FMI_VERSIONS:
         raise FmuError(f"the version of FMI must be one of {', '.join(FMI_VERSIONS)}, got {fmi!r}")
     if flavour == "python" and fmi != "2":
-        raise FmuError(f"FMUs of the Python flavour are of FMI 2 alone, as pythonfmu's are, got FMI {fmi}")
+        raise FmuError(f"FMUs of the Python flavour are of FMI 2 only, as pythonfmu's are, got FMI {fmi}")
     suffix = {("native", "2"): "", ("native", "3"): "Fmi3", ("python", "2"): "Py"}[flavour, fmi]
     return f"{model}{suffix}{'' if machine == DEFAULT_MACHINE else f'_{machine}'}"
 

@@ -2,7 +2,7 @@
 
 The modelDescription, the value references, the Python slave and the interface tables of the documentation follow from
 it. Single variables come first, then the modes, then the windows, so that the places of all before the modes are the
-same in all FMUs of a kind. A variable that a kind got later stands behind the modes, so that no other one has moved.
+same in all FMUs of a kind. A variable that a kind got later stands after the modes, so that no other one has moved.
 This module is packed into the FMUs: it needs nothing but the standard library.
 """
 
@@ -134,7 +134,7 @@ def _parameters(group: str, table: Mapping[str, Parameter], starts: Mapping[str,
 
 
 def _look_ahead_parameters(starts: Mapping[str, Value]) -> list[Variable]:
-    """Return the parameters of a predictor, alone or within a compensator."""
+    """Return the parameters of a predictor, by itself or within a compensator."""
     return [
         *_parameters("Look-ahead and residual model", PREDICTOR_SETTINGS, starts),
         *_parameters("Residual model with averaging", AVERAGING_SETTINGS, starts),

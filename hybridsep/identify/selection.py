@@ -81,7 +81,7 @@ held-out error may be what no structure explains, such as a first reversal."""
 
 _CANCELLING_WORTH, _HELD_OUT_WORTH = 0.6, 0.75
 """Ratios of the errors at which a model with a slow part that its zeros all but cancel is taken, geometric mean of
-fitted and held-out ones, and of the latter alone: a slow part that fits friction and cables leaves 0.64 to 0.85, one
+fitted and held-out ones, and of only the latter: a slow part that fits friction and cables leaves 0.64 to 0.85, one
 that is in the drive's loops less; friction that creeps looks so while it is fitted, and leaves 0.8 to 1 later."""
 
 _CREEPS = 5.0  # ratio of the rates at which friction may follow the command's sign
@@ -242,7 +242,7 @@ def well_damped(chosen: Candidate, segments: Sequence[Segment], T_s: float) -> C
     """Return a second order with a usual damping and a zero that is as good on both parts together, or the chosen one.
 
     A loop with velocity feed-forward follows without a lag however it is damped, so that motion that is slow beside it
-    tells its natural frequency alone. Without a zero only what is hardly damped has no lag; plans by it ring.
+    tells only its natural frequency. Without a zero only what is hardly damped has no lag; plans by it ring.
     """
     fit, structure = chosen.fit, chosen.structure
     if structure.n_modes != 1 or structure.lag or fit.theta[1] >= np.log(_LIGHT):

@@ -23,7 +23,7 @@ class Estimate:
     """Estimated parameter."""
 
     name: str
-    value: float
+    value: float  # in ``unit``, as its deviation
     std: float  # standard deviation; 0 for a parameter that was not estimated
     unit: str
 

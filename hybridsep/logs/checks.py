@@ -54,8 +54,8 @@ _HELD, _REPEATED = 0.1, 0.2
 motion that repeat the one before, from which they are noted."""
 
 _RESTED, _STOOD, _NOISE, _BACK = 0.3, 0.1, 8.0, 0.1
-"""Rest of a command, s, behind which something else moves an axis if it leaves where it stood for so many seconds by
-more than its largest error in motion and so many deviations of its noise; and share of that within which it is back."""
+"""Rest of a command, s, after which something else moves an axis if it leaves where it stood for as many seconds by
+more than its largest error in motion and as many deviations of its noise; and share of that within which it is back."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ class _Following(NamedTuple):
     left: float  # share of its variance that the best mixture of the other's earlier samples leaves, 0 … 1
     gain: float  # sum of the mixture's weights
     lag: float  # their mean lag, samples
-    gain_at_one: float  # weight of about the lag below alone
+    gain_at_one: float  # weight of the other one at just about the lag below
     lag_of_one: int  # the lag with which the two correlate best, samples
 
 
@@ -393,7 +393,7 @@ def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterato
         options = (("--delay N", "where the recorder is known to be N samples late"),)
         yield Finding("late", words, {"lag": late * log.T_s}, options=options)
     error = x - x_d[np.maximum(np.arange(len(x_d)) - late, 0)]
-    way = np.sign(np.diff(x_d, prepend=x_d[0]))  # in one direction alone a lag looks like an offset
+    way = np.sign(np.diff(x_d, prepend=x_d[0]))  # in only one direction a lag looks like an offset
     parts = [part for part in (error[way == one] for one in (-1.0, 0.0, 1.0)) if np.isfinite(part).sum() > _SAMPLES_MIN]
     medians = [float(np.nanmedian(part)) for part in parts]
     if len(medians) < 2 or min(medians) * max(medians) <= 0.0:

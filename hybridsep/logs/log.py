@@ -185,7 +185,7 @@ def read_log(
     for change, wanted in (
         (whole_turns, log.unit == "rad"),
         (partial(_even, lost=times.lost), times.lost is not None),
-        (_at_sensor_phase, chosen["x"].name != chosen["x_d"].name),  # commands alone may be held
+        (_at_sensor_phase, chosen["x"].name != chosen["x_d"].name),  # only commands may be held
         (partial(_shifted, delay=int(delay)), delay != 0),
         (_even, resample),
     ):

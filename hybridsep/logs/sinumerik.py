@@ -31,14 +31,14 @@ _MEASURED = (re.compile(r"actpos", re.IGNORECASE), re.compile(r"measpos", re.IGN
 
 @dataclass
 class _Signal:
-    """Signal as it is declared: name and axis of its address, interval, s, samples, type of its unit; its values."""
+    """Signal as it is declared, and its values."""
 
-    name: str
+    name: str  # of its address, as the axis
     axis: str
-    interval: float
-    n: int
-    kind: str
-    t: list[float] = field(default_factory=list)
+    interval: float  # s
+    n: int  # samples
+    kind: str  # type of its unit
+    t: list[float] = field(default_factory=list)  # s
     values: list[float] = field(default_factory=list)
 
 

@@ -6,13 +6,13 @@ predictor only, which is the planner that changes nothing (:class:`_Unmodified`)
 multiple of ``Np``, all commands of the next window's preview and every measurement before it have arrived: the weights
 are solved and the window is planned in that sample.
 
-During the first fill (``k < delay``) the commanded position is the start. A predictor alone neither predicts nor learns
+During the first fill (``k < delay``) the commanded position is the start. A mere predictor neither predicts nor learns
 it. A compensator plans from the beginning, so that it can act ahead of a move within its preview; it does not learn
 what is measured over the fill. ``t_init`` counts from the end of the fill.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Protocol
 
@@ -21,8 +21,9 @@ import numpy as np
 from ..base.errors import SignalError, check_has
 from ..base.settings import check, samples_before
 from ..base.signals import Array, check_position
-from ..base.state import FIXED, arrays_of, pack, restored, restoring, unpack
+from ..base.state import arrays_of, pack, restored, restoring, unpack
 from ..predict.predictor import HybridPredictor
+from .monitor import Monitor
 
 
 class SepState(IntEnum):
@@ -57,45 +58,6 @@ class PublishedWindow:
         """Return the window of a drive at rest at ``start``, m, without a prediction."""
         rest = np.full(Np, start)
         return cls(rest, rest, rest, rest, np.zeros(Np), 0, Np)
-
-
-@dataclass
-class Monitor:
-    """Monitor of the following error, as drives have one, and of measurements that are missing: their counts."""
-
-    n_lost: int = field(default=0, metadata=FIXED)  # samples without a measurement after which it is lost; 0: never
-    error_max: float = field(default=0.0, metadata=FIXED)  # largest following error, m; 0: none
-    n_missing: int = 0  # measurements that were missing one after another
-    n_over: int = 0  # samples above ``error_max`` one after another, three from when it tripped on
-    n_taken: int = 0  # samples taken in since the window began
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether no measurement came for so long that the change of the command fades, until one comes."""
-        return 0 < self.n_lost <= self.n_missing
-
-    @property
-    def is_tripped(self) -> bool:
-        """Whether the change of the command fades until a reset."""
-        return self.n_over >= 3  # in a row, missing ones aside: one or two may be the sensor's outliers
-
-    def take_in(self, error: float) -> bool:
-        """Take in a sample's following error, measured position minus command as it came, m; NaN where missing.
-
-        Returns whether it is within the limit, and nothing has tripped: what is not is not learned.
-        """
-        self.n_taken += 1
-        if math.isnan(error):
-            self.n_missing += 1
-            return True
-        self.n_missing = 0
-        if not self.is_tripped:
-            self.n_over = self.n_over + 1 if abs(error) > self.error_max > 0.0 else 0
-        return self.n_over == 0
-
-    def reset(self) -> None:
-        """End a trip; what was learned before it is kept."""
-        self.n_over = 0
 
 
 class Planner(Protocol):
@@ -175,7 +137,7 @@ class LookAhead:
     t_init : float, optional
         Warm-up after the first fill, s; the predictor's own if left out, 0 for a warm start.
     unit : {"m", "rad"}
-        Of positions: those of a rotary axis may be larger.
+        Of positions; a rotary axis may have larger ones.
 
     Attributes
     ----------
@@ -193,7 +155,7 @@ class LookAhead:
     """
 
     x_d: float = _now("x_d", "Commanded position now, m.")
-    x_dm: float = _now("x_dm", "Modified command now, m; ``x_d`` with a predictor alone.")
+    x_dm: float = _now("x_dm", "Modified command now, m; ``x_d`` with only a predictor.")
     x_pb: float = _now("x_pb", "Physics-based prediction for now, m.")
     x_h: float = _now("x_h", "Prediction for now by the best available model, m.")
     x_h_std: float = _now("x_h_std", "Standard deviation of ``x_meas − x_h`` now, m; 0 where it is not known.")
@@ -273,7 +235,7 @@ class LookAhead:
 
     @property
     def sep_state(self) -> int:
-        """Model that planned the commands of now, or tripped (``SepState``); 0 with a predictor alone."""
+        """Model that planned the commands of now, or tripped (``SepState``); 0 with only a predictor."""
         if self.alarm:
             return SepState.TRIPPED
         return self.window.state if self.k % self.Np >= self.window.n_followed else self.window.state_before
@@ -356,7 +318,7 @@ class LookAhead:
 
     @property
     def _first_compared(self) -> int:
-        """First sample that is compared: with what was published behind the first fill, as it was measured."""
+        """First sample that is compared: with what was published after the first fill, as it was measured."""
         return self.delay + self.predictor.settings.n_late
 
     def _compare(self) -> None:

@@ -58,14 +58,14 @@ class PlanarPath:
 
 @dataclass(frozen=True)
 class _Move:
-    """A line, an arc about ``centre`` by ``sweep``, rad, or a rest, s; ``feed`` is in m/s."""
+    """A line, an arc about ``centre`` by ``sweep``, or a rest."""
 
-    begin: complex
+    begin: complex  # m, X + iY, as the end and the centre
     end: complex
-    feed: float = inf
-    centre: complex | None = None
-    sweep: float = 0.0
-    rest: float = 0.0
+    feed: float = inf  # m/s
+    centre: complex | None = None  # of an arc
+    sweep: float = 0.0  # rad
+    rest: float = 0.0  # s
 
     def joined(self, after: "_Move") -> "_Move | None":
         """Return this move and the one after as one, if they are; otherwise None."""

@@ -40,7 +40,7 @@ class PredictorState:
     k: int  # samples of this run that are measured
     n_init: int  # samples of its warm-up
     start: float | None  # m: initial position; None until it is known. All other positions are relative to it
-    physics: Array  # (n_state,), m: state of ``G_pb`` behind the measured samples
+    physics: Array  # (n_state,), m: state of ``G_pb`` after the measured samples
     late: Array  # (n_late,), m: commands that are predicted and not measured yet
     residual: _ResidualModel
     uncertainty: Uncertainty
@@ -51,7 +51,7 @@ class HybridPredictor:
 
     For each window, call :meth:`predict` with its commands, then :meth:`update` with the measured positions.
     :meth:`predict` does not change the weights. Memory and cost per window are constant. With a ``measurement_delay``
-    what arrives over a window was measured so many samples earlier; what is not measured yet is predicted anew.
+    what arrives over a window was measured that many samples earlier; what is not measured yet is predicted anew.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ class HybridPredictor:
     def _with_error(self, forecast: Forecast) -> PredictedWindow:
         """Return the window of a forecast with what is known of its error, pending measurement.
 
-        With a ``measurement_delay`` the window begins so many samples earlier: they are not measured yet.
+        With a ``measurement_delay`` the window begins that many samples earlier: they are not measured yet.
         """
         x_pb, n = forecast.window.x_pb, len(forecast.e_h)
         active = np.arange(n) >= self._warm_up(n, late=len(self.state.late))

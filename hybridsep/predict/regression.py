@@ -30,7 +30,8 @@ def lags(series: Array, n: int) -> Array:
     """Return ``n`` values up to each sample, newest first, ``(len(series) − n + 1, n)``."""
     series = np.ascontiguousarray(series)  # so made, not by sliding_window_view, in a fiftieth of the time
     shape, step = (len(series) - n + 1, n), series.itemsize
-    return np.ndarray(shape, series.dtype, series, (n - 1) * step, (step, -step))
+    rows: Array = np.ndarray(shape, series.dtype, series, (n - 1) * step, (step, -step))
+    return rows
 
 
 def _folded(factor: Array, rows: Array, n_triangular: int = 0) -> Array:

@@ -46,7 +46,7 @@ _RECENT = 0.9  # factor by which the mean square of the residual fades from wind
 
 _MEMORY, _FIRST_EVIDENCE, _STEP = 0.97, 1.0, 6.0
 """Factor by which evidence fades from window to window; evidence that the first values count for, in windows; and the
-step of expectation maximisation, which alone would be slow where components are alike."""
+step of expectation maximisation, which by itself would be slow where components are alike."""
 
 _LEVELS = ((0.6745, 0.5), (1.645, 0.1), (1.96, 0.05))
 """Standard deviations, and the probability that a normal error exceeds them."""

@@ -19,7 +19,7 @@ class ResidualWindow(NamedTuple):
     x_d: Array
     x_pb: Array
     start: float  # m: initial position
-    # (m,), m: commands as they came, as far as they are known, relative to ``start``: behind a compensator they are
+    # (m,), m: commands as they came, as far as they are known, relative to ``start``: under a compensator they are
     # more than the window's, go on as its plans take it, and are not modified but for those that are late
     raw_commands: Array
 

@@ -1,4 +1,4 @@
-/* HAL component for LinuxCNC: servo error pre-compensation, or prediction alone, of one axis each in a servo thread.
+/* HAL component for LinuxCNC: servo error pre-compensation, or only prediction, of one axis each in a servo thread.
  *
  *     loadrt hsep axes=/home/me/x,/home/me/y
  *     addf hsep.x servo-thread              after motion-controller, before what writes to the drive
@@ -12,7 +12,7 @@
  *
  * Never a step: out is the command of look-ahead periods ago plus a change, in every branch but inactive, where it is
  * fb. The line of commands goes on in all of them. The change is the model's, which keeps the drive's limits, or, where
- * there is no model, what is left of it fades within them. A run of the model begins at rest alone: when the command
+ * there is no model, what is left of it fades within them. A run of the model begins only at rest: when the command
  * has stood for look-ahead periods, and no change is left. What ends one in motion (reset, another period) ends its
  * plans, and the model follows the remainder of the last one until then. A trip of its following-error monitor ends
  * none: reset ends the trip, and the model plans on.
@@ -121,7 +121,7 @@ static double *axis_value(axis_data *self, size_t place) { return &self->instanc
 /* What the two components differ in: the model's change of the command in this sample; the model that may plan until
  * the parameter is set, the machine file's; the pin state while the model has measurements; the time without a
  * measurement, s, after which the change fades, 0: never; which model may plan the next windows, and the reset, which
- * ends a trip; and limits of the drive, of which a predictor, that changes nothing, knows none: those of a slow one. */
+ * ends a trip; and limits of the drive, of which a predictor, that changes nothing, knows none: a slow drive's. */
 #if defined(HSEP_MODEL_SEP_COMPENSATOR)
 static double axis_planned(axis_data *self) { return *axis_value(self, HSEP_VR_x_dm) - *axis_value(self, HSEP_VR_x_d); }
 static unsigned axis_first_model(axis_data *self) { return *axis_value(self, HSEP_VR_compensate) > 1.0 ? 2 : 1; }

@@ -51,7 +51,7 @@ def test_a_hybrid_that_alone_began_trained_is_called_so(hybrid: float, n: int) -
     """Beside rivals that learn from nothing, in the sentence that compares them, whatever it advises."""
     found = judged(MOVING, hybrid, 1e-6)
     cut = replace(found.replay, Np=NP * N // n)
-    sentence = re.compile(r"the hybrid \(which alone began trained\)[^.]*\d\.\d\d ×", re.IGNORECASE)
+    sentence = re.compile(r"the hybrid \(the only one that began trained\)[^.]*\d\.\d\d ×", re.IGNORECASE)
     for warm in (False, True):
         assert bool(sentence.search(advice_on(replace(found, replay=cut, warm=warm)))) == warm
 

@@ -26,7 +26,7 @@ def test_backtest_of_a_log_with_missing_measurements(hybridsep: Run, tmp_path: P
     assert json.loads(out)["n_samples"] == 1999
     assert "1 of 2000 measurements were not learned: 1 missing" in json.loads(out)["verdict"]
     said = hybridsep.refused("backtest", log, "-m", "spring_mass_damper", *predictor(averaging="false"))
-    assert "1500 is missing; it is replayed with averaging alone (--set predictor.averaging=true)" in said
+    assert "1500 is missing; it is replayed with averaging only (--set predictor.averaging=true)" in said
 
 
 def test_backtest_takes_units_columns_and_parameters(hybridsep: Run, tmp_path: Path) -> None:

@@ -150,5 +150,5 @@ def test_a_warm_start_is_said(hybridsep: Run, log: Path, tmp_path: Path) -> None
     assert known in (tmp_path / "page.html").read_text(encoding="utf-8")
     other = write_rows(tmp_path / "other.csv", commanded(), measured(1))
     out = hybridsep.done("backtest", other, *warm, tmp_path / "other.html")
-    assert "Use the hybrid (which alone began trained): its error is 0." in out
+    assert "Use the hybrid (the only one that began trained): its error is 0." in out
     assert "began with what an earlier run had learned" in (tmp_path / "other.html").read_text(encoding="utf-8")

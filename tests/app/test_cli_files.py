@@ -151,7 +151,7 @@ REFUSED = [
     ("build Robot --flavour python", "no FMU Robot of spring_mass_damper; there are HybridPredictorPy"),
     ("build --flavour cobol", "flavour must be one of"),
     ("build --fmi 4", "the version of FMI must be one of 2, 3, got '4'"),
-    ("build --fmi 3 --flavour python", "FMUs of the Python flavour are of FMI 2 alone"),
+    ("build --fmi 3 --flavour python", "FMUs of the Python flavour are of FMI 2 only"),
     ("build --target sparc", "no target sparc; there are host"),
     ("build FeedDriveFmi3 --target host", "; FMUs of FMI 3.0 need --fmi 3"),
     ("build FeedDrivePy --flavour python --out {log}", "is a file, not a folder"),

@@ -87,7 +87,7 @@ def test_a_machine_file_that_fit_wrote_is_named(
 
 def test_the_same_log_twice_counts_once(tmp_path: Path, hybridsep: Run) -> None:
     logs = [write_rows(tmp_path / name, commanded()[:800], measured(0)[:800]) for name in ("a.csv", "b.csv")]
-    # A refusal that comes behind, and soon
+    # A refusal that comes after, and soon
     err = hybridsep.refused("fit", *logs, "--Np", 500, "--out", tmp_path / "fit")
     assert f"note: {logs[1]} has the samples of {logs[0]}: it counts once" in err
 

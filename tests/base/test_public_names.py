@@ -45,7 +45,7 @@ def test_packages_import_nothing() -> None:
 
 
 def loaded(arguments: list[str], status: int = 0) -> set[str]:
-    """Return the modules that are loaded at the end of a command, or, without arguments, behind the import alone."""
+    """Return the modules that are loaded at the end of a command, or, without arguments, after only the import."""
     command = f"sys.argv[1:] = {arguments!r}; from hybridsep.__main__ import main; main()"
     code = command if arguments else "import hybridsep"
     at_exit = "import atexit, json, sys; atexit.register(lambda: print('\\n' + json.dumps(sorted(sys.modules))))\n"

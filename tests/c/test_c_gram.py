@@ -21,7 +21,7 @@ TOGETHER = 4  # HSEP_GRAM_TOGETHER
 
 WORDS = ("n_head", "n_tail", "room", "begun", "factored", "waiting", "finished", "square")
 OFFSETS = ("penalties", "weights", "factor", "left", "least", "rows", "work", "abreast")
-"""Of hsep_solution, the offsets behind the other words."""
+"""Of hsep_solution, the offsets after the other words."""
 
 
 class CGram:
@@ -263,8 +263,8 @@ def test_rows_may_be_forgotten_altogether() -> None:
 
 
 def test_no_pivot_is_below_its_penalty_where_rows_are_alike() -> None:
-    # All columns are one: what distinguishes their weights is the penalty alone, 1e-13 of the sums of squares. A
-    # prediction and its variance are the same as with one column alone: 1e-6 relative.
+    # All columns are one: what distinguishes their weights is only the penalty, 1e-13 of the sums of squares. A
+    # prediction and its variance are the same as with just one column: 1e-6 relative.
     n, rng = 40, np.random.default_rng(0)
     column = rng.normal(size=1000)
     rows, target = np.tile(column[:, None], n), 3.0 * column

@@ -17,7 +17,7 @@ from benchmarks.targets.targets import FLOAT32, HERE, TARGETS, Replay, build, co
 SIZES = [(20, 20), (100, 50)]
 AGREES, AGREES_PLANNED = 5e-3, 1e-2
 """Relative difference of the RMS of predictions' errors that the README states for the paper's drive, without a
-compensator and behind one, whose bounded plans differ."""
+compensator and with one, whose bounded plans differ."""
 
 
 DOUBLE = ("-O2",)
@@ -28,7 +28,7 @@ NO_VECTORS = ("-O1", "-DHSEP_NO_VECTORS")
 
 @cache
 def core(options: tuple[str, ...]) -> list[Path]:
-    """Return the library's object files, the same for all cases; in double precision those of the other tests."""
+    """Return the library's object files, the same for all cases; in double precision the other tests'."""
     sources = core_sources()
     if options == DOUBLE:
         names = {source.stem for source in sources}
@@ -111,7 +111,7 @@ def test_a_processor_without_doubles_predicts_as_well(
 @pytest.mark.nightly
 @pytest.mark.slow
 def test_no_operation_of_a_sample_is_a_call(tmp_path: Path) -> None:
-    """Of the library's files one alone computes with doubles: the one that reads a weights file."""
+    """Of the library's files only one computes with doubles: the one that reads a weights file."""
     machine = target_or_skip("m4f-float32")
     calls = set()
     for source in core_sources():

@@ -85,9 +85,9 @@ def follows_its_slope(sep: SepCompensator) -> None:
         return np.asarray(found.window.x_pb + found.e_h)
 
     for column, slope in zip(changes.T, found.T, strict=True):
-        ahead, behind = (x_h(x_d + sign * size * column) for sign in (1.0, -1.0))
+        more, less = (x_h(x_d + sign * size * column) for sign in (1.0, -1.0))
         # Shrinking, stop operators and the second pass of the stiffness are held in the slope.
-        expected = (ahead - behind) / (2.0 * size)
+        expected = (more - less) / (2.0 * size)
         assert np.max(np.abs(slope - expected)) < 0.02 * np.max(np.abs(expected))
 
 
@@ -102,7 +102,7 @@ def test_the_slope_is_that_of_the_prediction(period: float) -> None:
 def test_late_commands_are_predicted_and_not_changed(late: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The preview after them is the end of a longer one, whose first commands stay as they are."""
     sep, n = SepCompensator.from_bytes(learned(2e-3)), 200  # kept for other tests: not with what is set next
-    monkeypatch.setattr(newton, "_APART", 1)  # the window is another one, and what is behind it
+    monkeypatch.setattr(newton, "_APART", 1)  # the window is another one, and what is after it
     x_d, basis = moves()[: late + n], SplineBasis(n, 2, n)
     whole, model = plan_model(sep, x_d), plan_model(sep, x_d, late)
     at, of_whole = model.predict(x_d[late:]), whole.predict(x_d)
@@ -178,7 +178,7 @@ def test_without_anything_learned_the_physics_model_plans() -> None:
 
 @pytest.mark.slow
 def test_a_plan_takes_less_of_a_change_that_takes_back_the_last_one() -> None:
-    """The same plan behind a last one that changed nothing, the opposite in the near part, and the same."""
+    """The same plan after a last one that changed nothing, the opposite in the near part, and the same."""
     x_d, sep = moves()[:200], SepCompensator.from_bytes(learned())
     assert sep.plan(x_d).state is SepState.HYBRID
     whole, planning = sep._pending.coefficients, sep._planning  # type: ignore[union-attr]

@@ -10,7 +10,7 @@ from properties import examples
 
 from hybridsep.base.settings import PARAMETERS, Limits
 from hybridsep.base.signals import Array
-from hybridsep.compensate.qp import DriveBounds
+from hybridsep.compensate.limits import DriveBounds
 from hybridsep.compensate.splines import N_DECIDED, SplineBasis
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest, spiral

@@ -17,9 +17,10 @@ from staircase_data import commanded
 
 from hybridsep.base.settings import Limits, PredictorSettings
 from hybridsep.base.signals import Array
+from hybridsep.compensate.limits import Bounds, DriveBounds
 from hybridsep.compensate.newton import TOLERANCE
 from hybridsep.compensate.planning import has_stable_poles
-from hybridsep.compensate.qp import EXACT, Bounds, DriveBounds, Minimum, Tolerance, solve
+from hybridsep.compensate.qp import EXACT, Minimum, Tolerance, solve
 from hybridsep.compensate.splines import N_DECIDED, PlanCost, SplineBasis, solved_splines
 from hybridsep.compensate.stop import Stop
 from hybridsep.cosim.loop import cosimulate
@@ -203,7 +204,7 @@ def test_compensation_ends_by_the_least_change_that_its_jerk_allows(
     sep.plan(np.zeros(200))
     assert sep._pending is not None
     found = sep._pending.coefficients
-    n, new = 3 + n_pinned, 10  # splines that are decided or pinned, and those behind the last plan
+    n, new = 3 + n_pinned, 10  # splines that are decided or pinned, and the ones after the last plan
     third = np.diff(np.concatenate((np.zeros((3, basis.values.shape[1])), basis.values)), 3, axis=0)
     before = np.diff(np.concatenate((sep._delta_before, np.zeros(200))), 3)
     weight = (2.0 * np.sin(np.pi * 5.0 / 200)) ** -3.0
@@ -275,7 +276,7 @@ def test_a_stop_takes_the_least_of_the_limits(limits: Limits | None) -> None:
         shared = found[:n]
 
     def cost(c: Array) -> float:
-        """Return the sum of squares of the differences, in limits, behind the shared coefficients."""
+        """Return the sum of squares of the differences, in limits, after the shared coefficients."""
         shares = enumerate(bounds.shares(SPACING), start=1)
         held = np.concatenate((c, np.full(3, c[-1])))
         return float(sum(share**2 * np.sum(np.diff(held, order)[n - order :] ** 2) for order, share in shares))

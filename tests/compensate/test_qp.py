@@ -57,7 +57,7 @@ def test_the_minimum_is_that_of_another_solver(
 
 @pytest.mark.slow
 def test_bounds_that_are_equal_or_nearly_so() -> None:
-    """The rows' Gram matrix alone is singular, and with multipliers in it P is lost in its rounding."""
+    """The mere Gram matrix of the rows is singular, and with multipliers in it P is lost in its rounding."""
     rng = np.random.default_rng(0)
     n = 30
     root = rng.normal(size=(n, n))

@@ -1,4 +1,4 @@
-"""Command lines and Python blocks of README and documentation, run page by page behind the README's fit."""
+"""Command lines and Python blocks of README and documentation, run page by page after the README's fit."""
 
 import contextlib
 import io

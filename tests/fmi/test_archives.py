@@ -37,7 +37,7 @@ etree: Any = import_module("lxml.etree")  # comes with fmpy, has no types
 MACHINE = load_machine("spring_mass_damper")
 ALL = [*NATIVE, *FMI3, *PYTHON]
 MORE_MODES_ALONE = tuple(f"{kind}_als25010_x" for kind in ("HybridPredictor", "HybridPredictorPy", "SepCompensator"))
-"""The default machine's variables and more modes, as other FMUs have: fmpy takes seconds for so many variables."""
+"""The default machine's variables and more modes, as other FMUs have: fmpy takes seconds for that many variables."""
 
 FILES = {
     "2": {"binaries/linux64/{}.so", "model.png", "sources/all.c", "documentation/licenses/fmi-headers.txt"},

@@ -170,7 +170,7 @@ def outputs_of(path: Path) -> list[list[float]]:
 def test_windows_can_be_left_out_and_nothing_else_is_missing(
     fmus: BuiltFmus, tmp_path: Path, name: str, hybridsep: Run
 ) -> None:
-    """For tools that choke on so many variables; where they are, they stand in the order of their samples."""
+    """For tools that choke on many variables; where they are, they stand in the order of their samples."""
     fmi = "3" if name.endswith("3") else "2"
     path = build_fmu(MACHINE, name, tmp_path, targets=("host",), fmi=fmi, windows=False)
     assert validate_fmu(str(path)) == []
@@ -180,7 +180,7 @@ def test_windows_can_be_left_out_and_nothing_else_is_missing(
     assert left_out == [key + place for key in WINDOWS for place in places]
     assert set(found) < set(whole)
     for key, variable in found.items():
-        if key != "time":  # the last one of FMI 3.0, behind the windows
+        if key != "time":  # the last one of FMI 3.0, after the windows
             assert variable.valueReference == whole[key].valueReference
     assert outputs_of(path) == outputs_of(fmus(name))
     if name == "HybridPredictor":
@@ -218,7 +218,7 @@ def test_a_rotary_axis_has_radians_for_metres(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("samples", "fmi"), [(None, "2"), ([0.1, 0.2, 0.3], "2"), ([0.1, 0.2, 0.3], "3")])
 def test_a_trajectory_declares_what_it_plays(tmp_path: Path, samples: list[float] | None, fmi: str) -> None:
-    """At the interval of its samples alone; those of the user's, where it was built with some, are the reference."""
+    """At the interval of its samples only; the user's own, where it was built with some, are the reference."""
     name, played = "ReferenceTrajectory" + "Fmi3" * (fmi == "3"), 3 + (samples is not None)
     path = build_fmu(MACHINE, name, tmp_path, targets=("host",), samples=samples, fmi=fmi)
     variables = variables_of(path)

@@ -93,7 +93,7 @@ def test_a_command_of_its_own_does_not_wait_for_other_platforms(without: Path) -
 
 
 def test_the_line_for_all_platforms_builds_the_same_fmu(hybridsep: Run, tmp_path: Path) -> None:
-    """As ``fit`` prints it; run for this machine alone."""
+    """As ``fit`` prints it; run for only this machine."""
     machine = tmp_path / "axis.toml"
     hybridsep("init", machine)
     fmu = build_here(load_machine(machine), "HybridPredictor", tmp_path)

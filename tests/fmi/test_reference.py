@@ -24,7 +24,7 @@ RUN.remove("SepCompensator_als25010_x")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", each_kind(RUN))
 def test_fmpy_repeats_the_run_to_the_stated_tolerance(fmus: BuiltFmus, tmp_path: Path, name: str) -> None:
-    """From its files alone, as a tool would that knows nothing of the FMU."""
+    """From only its files, as a tool would that knows nothing of the FMU."""
     fmpy.extract(str(fmus(name)), unzipdir=str(tmp_path))
     folder = tmp_path / REFERENCE_FOLDER
     given = folder / f"{name}_in.csv"

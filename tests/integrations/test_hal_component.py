@@ -120,7 +120,7 @@ def changed(folder: Path, name: str, *changes: tuple[str, str]) -> Machine:
 
 
 class Run:
-    """A drive of first order behind the component, and what the component writes.
+    """A drive of first order after the component, and what the component writes.
 
     ``cmd``: list, mm: the command as it came; ``fb``: mm: where the drive is; ``shown``: each (7,).
     """
@@ -161,7 +161,7 @@ class Run:
 
 
 def assert_no_step(run: Run) -> None:
-    """Differences of ``out`` are those of ``delayed``, plus what the limits allow."""
+    """Differences of ``out`` are ``delayed``'s, plus what the limits allow."""
     for order, limit in ((1, V), (2, A)):
         allowed = np.abs(np.diff(run.column(DELAYED), order)) + limit * (1 + 1e-6)
         assert np.all(np.abs(np.diff(run.column(OUT), order)) <= allowed), order
@@ -355,7 +355,7 @@ def test_nothing_but_numbers_is_written(folder: Path) -> None:
 
 
 def test_names_are_as_long_as_hal_allows(folder: Path) -> None:
-    """Those of pins, parameters and functions."""
+    """Names of pins, parameters and functions."""
     for model, letters in (("SepCompensator", 31), ("HybridPredictor", 21)):
         Component(changed(folder, "n" * letters), folder, model)
         assert _library(model).stub_longest_name() == 47
@@ -397,7 +397,7 @@ def test_nothing_steps(
 
     step(0.0)
     for what, periods, amount in events:
-        if what == "origin":  # behind a rest, so that nothing else explains it
+        if what == "origin":  # after a rest, so that nothing else explains it
             for _ in range(250):
                 step(held[-1])
             run.origin += math.copysign(5.0 + 20.0 * abs(amount), amount)

@@ -66,7 +66,7 @@ def _tones(numbers: Numbers, f: float, T_s: float, low: float, high: float) -> A
 
 
 def _swept(numbers: Numbers, f: float, T_s: float) -> Array:
-    """A swept sine through the bandwidth and far above it, which rests before and behind."""
+    """A swept sine through the bandwidth and far above it, which rests before and after."""
     t = T_s * np.arange(_N - 400)
     first, last = f * numbers.uniform(0.03, 0.2), min(f * numbers.uniform(1.5, 5.0), 0.15 / T_s)
     return np.pad(chirp(t, max(first, 2.0 / t[-1]), t[-1], last, phi=-90), 200, mode="edge")
@@ -166,7 +166,7 @@ def _reaches_a_share(share: float) -> Log:
 
 
 def _robot_joint(times: float, dead_time: int) -> Log:
-    """A joint of 3 Hz, driven so many times as fast and in motion from the first sample on."""
+    """A joint of 3 Hz, driven ``times`` times as fast and in motion from the first sample on."""
     t, numbers = 4e-3 * np.arange(3000), np.random.default_rng(75)
     x_d = sum(a * np.sin(2 * np.pi * 3.0 * times * f * t + p) for a, f, p in ((0.3, 1.0, 0.4), (0.1, 1.13, 2.0)))
     x = _modes(np.asarray(x_d), 4e-3, [Mode(3.0, 0.15, (6 * np.pi) ** 2)], dead_time)
@@ -334,7 +334,7 @@ NOTES: dict[str, Callable[[Log], Log]] = {
 
 
 def rested(log: Log, size: float) -> Log:
-    """Return a log with a rest of 1.5 s behind it, in which something else moves the axis by a size, m, and back."""
+    """Return a log with a rest of 1.5 s after it, in which something else moves the axis by a size, m, and back."""
     rest, push = np.full(1500, log.x_d[-1]), size * np.pad(np.hanning(600), (500, 400))
     end = log.x_meas[-1] + (rest[0] - log.x_meas[-1]) * -np.expm1(-np.arange(1500) / 6.0)
     return log_of(np.concatenate((log.x_d, rest)), np.concatenate((log.x_meas, end + push)), log.T_s)

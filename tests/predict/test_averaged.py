@@ -155,7 +155,7 @@ def test_what_is_held_is_bounded_by_what_was_learned() -> None:
 
 @pytest.mark.parametrize("direction", [-1.0, 0.0, 1.0])
 def test_nothing_is_held_where_the_command_turns(direction: float) -> None:
-    """Friction of one direction looks like an offset, which behind a reversal is twice as wrong as nothing."""
+    """Friction of one direction looks like an offset, which after a reversal is twice as wrong as nothing."""
     steps = 1e-5 * np.concatenate((np.ones(500), np.zeros(1250), np.full(50, direction)))
     x_d, predictor = np.cumsum(steps), averaged()
     run(predictor, x_d[:1700], physics(x_d)[:1700] + FRICTION)

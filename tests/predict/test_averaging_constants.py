@@ -34,7 +34,7 @@ DECLARED = re.compile(r"\s*(static const|#define)")
 
 
 def reasoned(text: str, tree: ast.Module) -> set[int]:
-    """Return the nodes of assignments with a comment or a docstring behind them."""
+    """Return the nodes of assignments with a comment or a docstring after them."""
     lines = text.splitlines()
     bodies = [tree.body, *(node.body for node in ast.walk(tree) if isinstance(node, ast.ClassDef))]
     return {
@@ -89,14 +89,14 @@ def test_what_is_learned_has_the_same_names_in_the_same_order() -> None:
     assert members("hsep_experts.h", "hsep_expert_errors") == names(ExpertErrors)
     assert members("hsep_experts.h", "hsep_residual_scale") == names(ResidualScale)
     assert members("hsep_gate.h", "hsep_gate")[:3] == names(InnovationGate)
-    *struct, largest = names(Learned)  # the last, whose number the settings decide, is behind the struct
+    *struct, largest = names(Learned)  # the last, whose number the settings decide, is after the struct
     assert members("hsep_averaged_model.h", "hsep_learned") == struct
     assert largest == members("hsep_averaged_model.h", "hsep_averaged")[-2]
 
 
 @pytest.mark.parametrize("package", ["predict", "predict/averaging"])
 def test_both_have_the_same_files(package: str) -> None:
-    """But for what one language alone needs."""
+    """But for what only one language needs."""
     of_library = {path.stem for path in (ROOT / "hybridsep" / package).glob("*.py")} - LIBRARY_ALONE
     of_core = {path.stem.removeprefix("hsep_") for path in (ROOT / "fmu_src/c/core" / package).glob("*.[ch]")}
     assert {AVERAGED.get(name, name) for name in of_library} == of_core - CORE_ALONE

@@ -59,7 +59,7 @@ def test_what_has_not_changed_keeps_what_was_learned() -> None:
 
 
 def test_what_was_learned_outlasts_a_motion_much_faster_than_the_first() -> None:
-    """The scale of an earlier run's first creep says nothing of what was learned behind it."""
+    """The scale of an earlier run's first creep says nothing of what was learned after it."""
     x_d = cycles(4 * PERIOD)
     warm = learned(x_d, friction(x_d))
     fastest = float(np.abs(np.diff(x_d)).max()) / TS

@@ -171,7 +171,7 @@ def test_a_singular_problem_has_a_minimum() -> None:
 
 
 def experts(three: Array) -> Array:
-    """Return the predictions of all experts, of which those behind the first three predict 0."""
+    """Return the predictions of all experts, of which all after the first three predict 0."""
     return np.concatenate((three, np.zeros((N_EXPERTS - 3, three.shape[1]))))
 
 
@@ -254,6 +254,6 @@ def test_an_expert_with_the_evidence_of_another_is_as_good() -> None:
     np.testing.assert_allclose(stack.gram, stack.gram.T)
     assert stack.gram[0, 1] == stack.gram[0, 0] == stack.gram[1, 1]
     stack = stack.update(np.zeros((N_EXPERTS, NP)), np.zeros(NP), 0.0)
-    assert stack.weights[1] - stack.weights[0] == pytest.approx(FIRST[1] - FIRST[0])  # what alone tells them apart
+    assert stack.weights[1] - stack.weights[0] == pytest.approx(FIRST[1] - FIRST[0])  # what only tells them apart
     stack = stack.forget(EXPERTS[0]).update(np.zeros((N_EXPERTS, NP)), np.zeros(NP), 0.0)
     assert stack.weights[0] < 1e-9

@@ -101,7 +101,7 @@ def stacked_cost(w: Array, rows: Array, target: Array, penalties: Array) -> floa
 def test_penalised_solves_the_stacked_system(
     kind: str, n: int, share: float, batches: list[int], exponent: float, seed: int
 ) -> None:
-    """With all features and with the first ones alone; with fewer rows than features, too."""
+    """With all features and with only the first ones; with fewer rows than features, too."""
     rng = np.random.default_rng(seed)
     m, k = 1 + round(share * (n - 1)), sum(batches)
     rows = rows_of(kind, k, n, rng)

@@ -40,7 +40,7 @@ def after_noise(std: float, n: int = 60, seed: int = 0, uncertainty: Uncertainty
 
 
 def after_a_hundred(errors: Array) -> list[tuple[Array, Array]]:
-    """Return errors and deviations of windows at rest behind the first hundred; all are learned."""
+    """Return errors and deviations of windows at rest after the first hundred; all are learned."""
     uncertainty, found = Uncertainty.init(1e-12), []
     for one in errors:
         predicted = window(uncertainty)

@@ -212,7 +212,7 @@ def at_rest_first(k: int, x_meas: float, last: float) -> float:
 
 @on_all(LOOK_AHEADS)
 def test_a_measurement_that_comes_a_sample_early_is_held(new_stream: StreamMaker) -> None:
-    """As a sequential master carries it; the outputs are those of measurements in time, bit for bit."""
+    """As a sequential master carries it; the outputs are as with measurements in time, bit for bit."""
     values = SHORT[kind_of(new_stream.model)]
     loop = closed_loop(new_stream.model, 300, values, sensor=at_rest_first)
     early = replace(loop, x=np.append(loop.x[1:], loop.x[-1]))

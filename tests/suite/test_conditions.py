@@ -159,7 +159,7 @@ def test_growing_and_ringing_are_predicted_as_by_the_library(new_stream: StreamM
     [
         ("k", 1.2, 1333, ARX_RESIDUAL),
         ("c_nl", 3.0, 150, ARX_COMMAND),
-        # of the drive, told by errors alone in the window that ends then, predicted again
+        # of the drive, told only by errors in the window that ends then, predicted again
         ("k_nl", 0.7, 2499, ARX_RESIDUAL),
     ],
 )
@@ -175,7 +175,7 @@ def test_a_changed_plant_is_relearned_as_by_the_library(
 
 
 N, NP, FIRST = 2000, 20, 1000
-"""Samples of a run and of a window; first sample that is judged, behind one half of the staircase."""
+"""Samples of a run and of a window; first sample that is judged, after one half of the staircase."""
 
 MISSING: dict[str, Indices] = {
     "none": np.arange(0),
@@ -210,7 +210,7 @@ CHANGE_MAX = 5e-6  # m: every plan of the physics model is at it
 def test_half_of_the_largest_change_until_the_motion_was_measured(
     new_stream: StreamMaker, trained: bool, shares: list[float]
 ) -> None:
-    """Of the physics model's plan where no weights judge it; those of another motion are forgotten on the way."""
+    """Of the physics model's plan where no weights judge it; the ones of another motion are forgotten on the way."""
     stream = new_stream.planted(learned(PREDICTOR, Np=NP, p=6, q=2)) if trained else new_stream()
     initialise(stream, compensate=1, change_max=CHANGE_MAX)
     velocity = np.convolve(np.repeat([0.0, 0.02, 0.2], [20, 300, 160]), np.full(40, 1 / 40))[:480]
@@ -222,6 +222,6 @@ def test_half_of_the_largest_change_until_the_motion_was_measured(
         stream.step(k * T_S, T_S)
         outputs = stream.outputs()
         changes.append(abs(outputs[x_dm] - outputs[x_d]))
-    # At 20 mm/s for the first time; later; and behind what is left of the plans from before 200 mm/s came in sight
+    # At 20 mm/s for the first time; later; and after what is left of the plans from before 200 mm/s came in sight
     found = [max(changes[first:last]) / CHANGE_MAX for first, last in ((0, 120), (120, 340), (380, 480))]
     assert found[: len(shares)] == pytest.approx(shares, rel=1e-3)

@@ -67,7 +67,7 @@ def in_samples(new_stream: StreamMaker, points: Clock, start: float) -> list[lis
     instants = instants_of(points)
     outputs = [stream.outputs()]
     for k, instant in enumerate(instants[:-1]):
-        step = bisect_right(points, instant) - 1  # an instant at a communication point belongs to the step behind it
+        step = bisect_right(points, instant) - 1  # an instant at a communication point belongs to the step after it
         set_inputs(stream, float(points[step]) * T_S)
         stream.step(start + k * T_S, T_S)
         outputs.append(stream.outputs())

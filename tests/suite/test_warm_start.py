@@ -1,4 +1,4 @@
-"""Weights of an earlier run, on every implementation: they predict at once, and fit one set of settings alone."""
+"""Weights of an earlier run, on every implementation: they predict at once, and fit only one set of settings."""
 
 import re
 from dataclasses import replace

@@ -152,7 +152,7 @@ def test_a_move_in_sight_is_prepared_in_the_fill_which_is_not_learned(new_stream
     state = OUTPUTS[COMPENSATOR].index("sep_state")
     assert runs[0][:, state].max() == 2.0
     # What was measured over the fill is in no weight and no error; its last residual tells how uncertain x_h is. The
-    # window behind it is learned.
+    # window after it is learned.
     first, second = (np.delete(run[:61], OUTPUTS[COMPENSATOR].index("x_h_std"), axis=1) for run in runs)
     np.testing.assert_array_equal(first, second)
 

@@ -32,7 +32,7 @@ FMI3 = [name for name, (_, _, fmi) in _FMUS.items() if fmi == "3"]
 def each_kind(values: Sequence[str] | Sequence[tuple[str, ...]]) -> list[Any]:
     """Return names of FMUs, or tuples that end in one, as pytest parameters; some machines' run at night.
 
-    The stage's Y drive differs from its X drive in numbers alone, and the rotary machine from the default one.
+    The stage's Y drive differs from its X drive only in numbers, and the rotary machine from the default one.
     """
     rows = [(value,) if isinstance(value, str) else value for value in values]
     return [pytest.param(*row, marks=_AT_NIGHT if row[-1].endswith(("_als25010_y", "_emps")) else []) for row in rows]
@@ -46,7 +46,7 @@ SHARED_BUILDS = "HYBRIDSEP_TESTS_BUILDS"
 
 
 def shared_builds() -> Path:
-    """Return that folder, of this process alone where there is no session."""
+    """Return that folder, of only this process where there is no session."""
     return Path(os.environ.get(SHARED_BUILDS) or build_folder())
 
 

@@ -55,7 +55,7 @@ def sanitising_compiler() -> list[str]:
 
 
 def _catches_overflows(command: Sequence[str]) -> bool:
-    """Return whether a compiler's address sanitizer sees a write behind a block; a library found may not be its own."""
+    """Return whether a compiler's address sanitizer sees a write past a block; a library found may not be its own."""
     source, program = build_folder() / "overflow.c", build_folder() / "overflow"
     source.write_text(
         "#include <stdlib.h>\nint main(int n, char **a) { char *b = malloc(8); b[7 + n] = **a; free(b); }\n"

@@ -1,4 +1,4 @@
-"""Symbols of an ELF file, without binutils, which a machine with Python alone does not have."""
+"""Symbols of an ELF file, without binutils, which a machine with only Python does not have."""
 
 import struct
 from dataclasses import dataclass

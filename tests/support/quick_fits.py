@@ -6,12 +6,12 @@ from hybridsep.identify.structure import STRUCTURES
 
 
 def without_larger_structures(patch: pytest.MonkeyPatch) -> None:
-    """Let ``fit`` try structures of a lag or one mode alone: half of its time."""
+    """Let ``fit`` try structures of only a lag or one mode: half of its time."""
     small = [one for one in STRUCTURES if one.n_modes + one.lag <= 1]
     patch.setattr("hybridsep.identify.operation.STRUCTURES", small)
 
 
 def without_other_settings(patch: pytest.MonkeyPatch) -> None:
-    """Let ``fit`` try the default settings alone: a fifth of its time."""
+    """Let ``fit`` try only the default settings: a fifth of its time."""
     patch.setattr("hybridsep.fitting.choice._SHARES", ())
     patch.setattr("hybridsep.fitting.choice._Q", ())

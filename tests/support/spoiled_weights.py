@@ -19,12 +19,12 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
     body = content[:-8]
     n_settings, n_modes, n_learned = struct.unpack_from("<3Q", body, 8)
     settings = [body[_HEAD + _SETTING * i : _HEAD + _SETTING * (i + 1)] for i in range(n_settings)]
-    behind = body[_HEAD + _SETTING * n_settings :]
+    after = body[_HEAD + _SETTING * n_settings :]
     names = [setting[:24].rstrip(b"\0") for setting in settings]
 
     def with_setting(i: int, name: bytes, value: float) -> bytes:
         changed = [*settings[:i], struct.pack("<24sd", name, value), *settings[i + 1 :]]
-        return sealed(body[:_HEAD] + b"".join(changed) + behind)
+        return sealed(body[:_HEAD] + b"".join(changed) + after)
 
     def with_head(place: int, number: int) -> bytes:
         at = 8 + 8 * place
@@ -46,7 +46,7 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
         "a factor that is cut": sealed(body[:-8]),
         "a number that is none": sealed(body[:numbers] + struct.pack("<d", float("nan")) + body[numbers + 8 :]),
         "a factor that is not finite": sealed(body[:-8] + struct.pack("<d", float("inf"))),
-        "more behind it": sealed(body + bytes(8)),
+        "more after it": sealed(body + bytes(8)),
     }
     other = {f"another {name.decode()}": with_setting(i, name, -7.5) for i, name in enumerate(names)}
     other |= {

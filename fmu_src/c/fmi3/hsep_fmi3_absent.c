@@ -80,7 +80,7 @@ FMI3_ABSENT(GetNominalsOfContinuousStates, fmi3_no_model_exchange, fmi3Instance 
 FMI3_ABSENT(GetNumberOfEventIndicators, fmi3_no_model_exchange, fmi3Instance instance, size_t *n)
 FMI3_ABSENT(GetNumberOfContinuousStates, fmi3_no_model_exchange, fmi3Instance instance, size_t *n)
 
-/* Another kind of FMU, with these parameters behind those of all kinds, logger one of them: there is no instance of it.
+/* Another kind of FMU, with these parameters after all kinds' own, logger one of them: there is no instance of it.
  */
 #define FMI3_NO_INSTANCE(kind, logger, ...) \
     fmi3Instance fmi3Instantiate##kind( \

@@ -25,10 +25,10 @@ HSEP_API const char *hsep_number(char text[HSEP_NUMBER_SIZE], double value, hsep
 /* The same for a real number, as text that lasts as long as the block that it stands in. */
 #define HSEP_SHOWN(value) hsep_number((char[HSEP_NUMBER_SIZE]){0}, value, HSEP_REAL)
 
-/* Check a parameter alone, by its place in the table; return whether it is in its range, else with a message. */
+/* Check a parameter by itself, by its place in the table; return whether it is in its range, else with a message. */
 HSEP_API int hsep_check_parameter(const hsep_context *context, size_t i, double value, char message[]);
 
-/* Check every parameter alone, the range being the table's; return how many are wrong, each added to message. */
+/* Check every parameter by itself, the range being the table's; return how many are wrong, each added to message. */
 HSEP_API int hsep_check_parameters(const hsep_context *context, const double values[], char message[]);
 
 /* Check that a position, m or rad, is finite and as near as machines are. where: format of at, the message's end. */

@@ -61,7 +61,7 @@ typedef struct {
     const hsep_variable *variables; /* rows: n_scalars, HSEP_MODE_NUMBERS if it has modes, n_last, windows */
     size_t n_scalars;
     size_t n_modes;
-    size_t n_last; /* single variables behind the modes */
+    size_t n_last; /* single variables after the modes */
     size_t window; /* samples in each window, 0 where they are left out */
     size_t n_variables;
     /* (n_scalars + HSEP_MODE_NUMBERS n_modes + n_last,), 0 for what is calculated; so are the windows */
@@ -73,7 +73,7 @@ typedef struct {
     size_t weights_size;   /* bytes */
 } hsep_context;
 
-/* Check the parameters in values, alone and together, and return the size of the state, bytes.
+/* Check the parameters in values, each and together, and return the size of the state, bytes.
  * Fails with a message that names every parameter that is out of its range, the range and what came.
  * ReferenceTrajectory looks up the number of samples in its resource for that. */
 HSEP_API hsep_status hsep_model_size(const hsep_context *context, const double values[], size_t *size, char message[]);

@@ -13,12 +13,12 @@ HSEP_API size_t hsep_table_n_starts(const hsep_context *context)
 HSEP_API const hsep_variable *hsep_table_row(const hsep_context *context, size_t place)
 {
     const size_t before = hsep_table_n_starts(context), last = before - context->n_last;
-    const size_t behind = context->n_scalars + (context->n_modes > 0 ? HSEP_MODE_NUMBERS : 0);
+    const size_t after = context->n_scalars + (context->n_modes > 0 ? HSEP_MODE_NUMBERS : 0);
     size_t row = place;
     if (place >= before) {
-        row = behind + context->n_last + (place - before) / context->window;
+        row = after + context->n_last + (place - before) / context->window;
     } else if (place >= last) {
-        row = behind + place - last;
+        row = after + place - last;
     } else if (place >= context->n_scalars) {
         row = context->n_scalars + (place - context->n_scalars) % HSEP_MODE_NUMBERS;
     }

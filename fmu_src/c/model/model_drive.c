@@ -29,7 +29,7 @@ typedef struct {
 } drive_state;
 
 /* The plant's own ---------------------------------------------------------------------------------------------------
- * drive_check: of its parameters together, after each alone; *bytes: of its block, counted in double. drive_begin: at
+ * drive_check: of its parameters together, after each of them; *bytes: of its block, counted in double. drive_begin: at
  * rest at the start value of x_d. drive_step: by h, s, with the command x_d, m, held; fails, with the state unchanged,
  * if the state overflows. */
 

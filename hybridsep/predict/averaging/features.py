@@ -129,7 +129,7 @@ class StaticFeatures:
     q: int  # largest lag of ``x_pb``, as that many differences, at most three
     period: float = 0.0  # m: of a disturbance that repeats with the position; 0: none
     own: tuple[Disturbance, ...] = ()  # the user's own
-    # behind a compensator: commands that are known from the last measured one on, of a path that may go on. The
+    # under a compensator: commands that are known from the last measured one on, of a path that may go on. The
     # position's own velocity is damped then, as ``x_pb`` turns with every change of the command, else that of ``x_pb``
     n_known: int | None = None
 

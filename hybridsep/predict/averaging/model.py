@@ -212,7 +212,7 @@ class AveragedModel:
         return state.with_noise(learned)
 
     def plan_ahead(self, preview: int) -> AveragedModel:
-        """Return the model where a compensator decides the commands, and knows so many samples ahead."""
+        """Return the model where a compensator decides the commands, and knows ``preview`` samples ahead."""
         return replace(self, static=replace(self.static, n_known=self.settings.n_late + preview))
 
     def for_plans(self) -> AveragedModel:
@@ -270,7 +270,7 @@ class AveragedModel:
         of_physics = of_physics or self.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, of_physics.rows, {}, recalled)
         if STATIC in solved:
-            # The stiffness acts at the position, which the physics model alone does not give well enough.
+            # The stiffness acts at the position, which the physics model by itself does not give well enough.
             x = x + STATIC.predict(at, held.get(STATIC), None).e_h
             at = replace(at, rows=self.static.rows(self.run.static, window, x, scales.velocity, of_physics).rows)
         predictions = {one: one.predict(at, held.get(one), counts) for one in solved}
@@ -445,7 +445,7 @@ def _judged(
     harmed = errs and harm * seen > CONSTANTS.discard_harm * (largest * settings.Np) ** 2
     if not (state.doubts and harmed and stack.weights[fresh] > CONSTANTS.discard_above):
         return replace(state, learned=learned)
-    # All experts go on with this run alone, and are judged anew.
+    # All experts go on with only this run, and are judged anew.
     anew = {ARX_RESIDUAL: ExpertErrors(), STATIC: ExpertErrors(), state.leading: learned.errors_of(FRESH_START)}
     learned = replace(learned.with_errors(anew), stacks=(Stack.init(),) * 2)
     evidence = state.evidence[0].forget_earlier(), state.evidence[1].forget_earlier()

@@ -3,7 +3,7 @@
 Most axes repeat: a part program, a pick and place, a test signal. The memory has the commands as they came, and the
 residuals. For each lag ``τ`` a sum ``D_τ ← γ D_τ + (Δu(k) − Δu(k−τ))²`` of changes ``Δu`` over some samples follows how
 much the commands ahead, and those before them, are like those ``τ`` samples before; it fades in as many as are
-predicted. The lag with the least gives the residuals that were measured then. Behind a compensator it is the shortest
+predicted. The lag with the least gives the residuals that were measured then. Under a compensator it is the shortest
 of those that are alike: what the drive was told then is most like what it is told now. They count by
 ``1/(1 + (D_τ/S)/ρ²)``, with the same sum ``S`` of the changes themselves, and a tolerance ``ρ``. There a part that came
 some times is remembered as a mean, which fades: with the last one alone what the physics model has wrong would grow.
@@ -22,7 +22,7 @@ _UPDATES = 25
 
 _ALIKE = 1e-100  # square of a change, m², that counts as 0: sums of smaller ones would slow a processor down
 
-_SAME = 1e-5  # distance, relative to the changes', below which stretches behind a compensator are the same
+_SAME = 1e-5  # distance, relative to the changes', below which stretches under a compensator are the same
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ class WarmStartRows:
         return replace(self.forget(), this=self.all())
 
     def forget_earlier(self) -> WarmStartRows:
-        """Go on with the rows of this run alone."""
+        """Go on with only the rows of this run."""
         return replace(self.forget(), this=self.this)
 
     def discount(self, forgetting_factor: float) -> WarmStartRows:

@@ -1,7 +1,7 @@
 """Engine that works on many tasks: Dask distributed, a cluster of this machine or a running one.
 
 Dask blames every task that is assigned to a worker as it dies. So no worker has more than one, and one that is blamed
-is repeated alone before it is reported: if the process ends twice, the log itself is the cause, by its memory for
+is repeated by itself before it is reported: if the process ends twice, the log itself is the cause, by its memory for
 example.
 """
 
@@ -36,7 +36,7 @@ _CONFIG: dict[str, Any] = {
 }
 """Settings of a cluster that is started here."""
 
-_ALONE = 2  # attempts alone of a task that is blamed: it may not even have run, as it waited behind another
+_ALONE = 2  # lone attempts of a task that is blamed: it may not even have run, as it waited behind another
 _COUNTED = 1.0  # time for which a count of workers is kept before they are counted again, s
 _REACHED = 10.0  # time within which a scheduler answers, s
 _CLOSED = 30.0  # time within which a cluster closes, s: rarely, Dask has waited for a worker without end
@@ -191,7 +191,7 @@ def cluster(workers: int = 0, scheduler: str = "") -> Iterator[Engine]:
                 threads_per_worker=1,
                 host="127.0.0.1",
                 security=Security.temporary(),
-                dashboard_address="127.0.0.1:0",  # of its own, so that several may run, and for this machine alone
+                dashboard_address="127.0.0.1:0",  # of its own, so that several may run, and for this machine only
                 silence_logs=50,
             )
         with _ending(started), Client(started) as client:

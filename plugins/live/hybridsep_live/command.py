@@ -20,7 +20,7 @@ def live(
     source: Annotated[
         str,
         typer.Argument(
-            help="A log; udp:[HOST:]PORT, JSON messages at this machine alone unless HOST is another of its addresses; "
+            help="A log; udp:[HOST:]PORT, JSON messages at this machine only unless HOST is another of its addresses; "
             "- for lines of CSV or JSON on standard input."
         ),
     ],

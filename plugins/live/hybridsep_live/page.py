@@ -29,7 +29,7 @@ _FLUSHED = 5.0  # longest wait for the page's process, s
 
 
 class Page:
-    """Page that a browser of this machine shows, at :attr:`address` alone.
+    """Page that a browser of this machine shows, only at :attr:`address`.
 
     ``shown``: units; ``port``: 0 for a free one. ``address``: with the token, without which there is nothing to see;
     ``n_dropped``: rows that the page missed, as its process was too slow. ParameterError if the port is taken.

@@ -1,4 +1,4 @@
-"""Page of a run: its document, and the Bokeh server that gives it to who knows the token, on this machine alone."""
+"""Page of a run: its document, and the Bokeh server that gives it to who knows the token, only on this machine."""
 
 import asyncio
 import hmac

@@ -53,7 +53,7 @@ class _Names(Source):
         return False
 
     def read(self, names: Sequence[str]) -> Block:
-        """Return nothing: there are names alone."""
+        """Return nothing: there are only names."""
         return Block([], str)
 
 

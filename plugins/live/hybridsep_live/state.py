@@ -62,7 +62,7 @@ class History:
 
 
 def drawn(rows: Array, first: int, columns: int) -> Array:
-    """Return rows of which each column keeps its extremes, in their order, for a line of so many pixels.
+    """Return rows of which each column keeps its extremes, in their order, for a line of that many pixels.
 
     Stretches are of equal length and begin at multiples of it, so that a line that moves does not flicker.
 

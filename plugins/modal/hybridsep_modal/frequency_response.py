@@ -55,7 +55,7 @@ class IdentifiedResponse:
     # each (int, float, float): number of modes, RMS of the relative error, Bayesian information criterion
     criteria: tuple[tuple[int, float, float], ...]
     findings: tuple[str, ...]  # what a user should know, in words
-    phase_measured: bool = True  # whether the response has the phase that was measured; else it is the magnitude alone
+    phase_measured: bool = True  # whether the response has the phase that was measured; else it is only the magnitude
 
     def machine(self, name: str, title: str, **entries: Any) -> Machine:
         """Return the machine with this model, as :meth:`IdentifiedModel.machine` does."""

@@ -32,7 +32,7 @@ class Disturbances:
     phase: float = 0.0  # of the cogging at the start, periods
     drift: float = 0.0  # m: final drift of the position
     time_constant: float = 1.0  # s: of the drift
-    # m: backlash behind the drive and before it
+    # m: backlash after the drive and before it
     play: float = 0.0
     command_play: float = 0.0
     play_start: float = 0.0  # place within the backlash at the start, −1 to 1
@@ -62,8 +62,8 @@ def random_disturbances(draws: Draws, stroke: float, in_antiphase: bool) -> Dist
             "bristle": draws.uniform(-1.0, 1.0) if draws.chance(0.5) else 0.0,
         }
     if draws.chance(0.3):
-        behind = draws.chance(0.5)
-        values |= {"play" if behind else "command_play": min(size(), 1e-4), "play_start": draws.uniform(-1.0, 1.0)}
+        after = draws.chance(0.5)
+        values |= {"play" if after else "command_play": min(size(), 1e-4), "play_start": draws.uniform(-1.0, 1.0)}
     if draws.chance(0.3):
         values |= {
             "cubic": draws.sign() * min(size(), CUBIC_SHARE * stroke),

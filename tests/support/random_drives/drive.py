@@ -15,7 +15,7 @@ Choice = TypeVar("Choice")
 
 
 class Draws:
-    """Random numbers that follow from whole numbers alone, such as a seed and the index of a drive."""
+    """Random numbers that follow from only whole numbers, such as a seed and the index of a drive."""
 
     def __init__(self, *key: int) -> None:
         self._rng = np.random.default_rng(key)

@@ -53,15 +53,15 @@ def _drift(n: int, values: dict[str, Array]) -> Array:
 
 
 def _after_play(x: Array, width: Array, start: Array) -> Array:
-    """Return positions behind a backlash, ``(n, m)``, m, from 0 on."""
+    """Return positions after a backlash, ``(n, m)``, m, from 0 on."""
     if not width.any():
         return x
     half, y = width / 2, start * width
-    behind = np.empty_like(x)
+    after = np.empty_like(x)
     for k in range(len(x)):
         y = np.minimum(np.maximum(y, x[k] - half), x[k] + half)
-        behind[k] = y
-    return np.asarray(behind - start * width)
+        after[k] = y
+    return np.asarray(after - start * width)
 
 
 def _motion(models: Sequence[ModalModel], values: dict[str, Array], u: Array) -> Array:

@@ -26,7 +26,7 @@ CANCELLING = 3.0  # sum of the magnitudes of the modes' static gains from which 
 
 
 def nominal_model(draws: Draws, loop: LinearLoop, dead_time: int) -> ModalModel:
-    """Return a physics model of a loop behind a dead time, samples."""
+    """Return a physics model of a loop after a dead time, samples."""
     kind = draws.uniform(0.0, 1.0)
     true = loop.model
     if kind < 0.25:

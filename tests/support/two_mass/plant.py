@@ -16,7 +16,7 @@ from two_mass.axis import Axis, Friction, LinearLoop
 INTERNAL_STEP = 4e-5
 """Longest internal step, s; the bristles of the stiffest friction drawn vibrate at 25 rad in a millisecond."""
 
-_N_STATES = 14  # numbers of drive.c's structure that change, 0 at first, behind its parameters
+_N_STATES = 14  # numbers of drive.c's structure that change, 0 at first, after its parameters
 
 
 @cache

@@ -1,7 +1,5 @@
 #include "hsep_compensator.h"
 
-static const hsep_tolerance compensator_exact = {HSEP_QP_EXACT};
-
 HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_predictor_parameters *parameters)
 {
     const hsep_real preview = (hsep_real)parameters->preview, horizon = (hsep_real)parameters->horizon;
@@ -143,7 +141,7 @@ static int compensator_has_stable_poles(const hsep_recursion *recursion, hsep_re
     return 1;
 }
 
-/* Samples of a window that follow the last plan while one is made, not one alone: spread needs differences. */
+/* Samples of a window that follow the last plan while one is made, not only one: spread needs differences. */
 static hsep_int compensator_pinned(hsep_compensator *self)
 {
     const hsep_int pinned = hsep_planner_pinned(hsep_compensator_planner(self));
@@ -184,15 +182,16 @@ static void compensator_solve(hsep_compensator *self)
     const hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_int pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
     const hsep_int left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
-    int done = 0;
-    if (self->averaged) {
+    int done = left <= 1;
+    if (self->averaged) { /* it is followed when it is due, so nothing depends on when it is made */
         const hsep_newton_task task = compensator_task(self);
-        done = hsep_newton_run(hsep_compensator_newton(self), &task, left);
+        hsep_newton_run(hsep_compensator_newton(self), &task, left);
         self->state = done ? hsep_compensator_newton(self)->planned : self->state;
-    } else { /* parts of the solver's steps, all that are left of them in the last sample */
-        const hsep_int due = left > 0 ? HSEP_INTERIOR_PARTS * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
-        for (hsep_int part = 0; !done && part < due; part++) {
-            done = hsep_planner_advance(hsep_compensator_planner(self));
+    } else { /* halves of the solver's steps, all that are left of them in the last sample */
+        const hsep_int due = left > 0 ? 2 * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
+        done = 0;
+        for (hsep_int half = 0; !done && half < due; half++) {
+            done = hsep_planner_advance(hsep_compensator_planner(self)) == HSEP_PLAN_DONE;
         }
         if (done) {
             hsep_planner_carry_out(hsep_compensator_planner(self), hsep_at_const(predictor, predictor->x_d));
@@ -210,9 +209,9 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     compensator_target(self, state);
     const hsep_real *spline =
         state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
-    hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
+    hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d), 0, 1.0);
     hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
-    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact);
+    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), HSEP_QP_STEPS);
     self->state = (hsep_int)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }
@@ -236,7 +235,7 @@ static int compensator_plan(hsep_compensator *self)
         status = compensator_try(self, HSEP_SEP_PHYSICS);
     } else if (self->compensate == HSEP_SEP_OFF && before != HSEP_SEP_OFF) {
         hsep_planner_end(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
-        status = hsep_planner_solve(hsep_compensator_planner(self), &compensator_exact);
+        status = hsep_planner_solve(hsep_compensator_planner(self), HSEP_QP_STEPS);
     }
     predictor->n_physics = self->state == HSEP_SEP_HYBRID ? 0 : predictor->Np;
     return status == HSEP_PLAN_BOUNDED;

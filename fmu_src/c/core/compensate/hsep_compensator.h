@@ -5,9 +5,9 @@
  * samples that follow, while the command follows the last plan. With averaging every plan is solved so, over
  * HSEP_PLANNING_PINNED_AVERAGED samples (hsep_newton_run).
  *
- * Cost of a sample: as hsep_predictor.h has it, and of a plan, as the planners have it, at most an equal share in each
- * sample that follows the last plan; without averaging more where fewer than 8 do (Np < 16, or spacing > 8), or all of
- * it at once. It is bounded by the parameters; 1000 splines in a plan are far from real time.
+ * A sample costs what hsep_predictor.h says, and an equal share of a plan where it follows the last one; without
+ * averaging more where fewer than 8 do (Np < 16, or spacing > 8), or all of it at once. It is bounded by the
+ * parameters; 1000 splines in a plan are far from real time.
  *
  * Once the parameters are in range nothing here fails but the prediction of a window, as in hsep_predictor.h.
  */
@@ -37,7 +37,7 @@ struct hsep_compensator {
     hsep_real first_load;      /* and that of the first sample, from which it counts, as positions do from the start */
     hsep_int x_dm;             /* (Np,) m, the window: modified commands */
     hsep_int loads;            /* (preview,) m, ring of the loads that came last, */
-    hsep_int load;      /* (horizon,) m, and those of the window and of what follows it: the drive moves as by so much
+    hsep_int load;      /* (horizon,) m, of the window and of what follows it, too: the drive moves as by that much
                            more command */
     hsep_int trial_x;   /* (horizon + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
     hsep_int trial_e;   /* (horizon + p,) m, its residuals */

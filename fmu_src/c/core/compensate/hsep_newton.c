@@ -1,9 +1,9 @@
 #include "hsep_newton.h"
 
 #include "hsep_cholesky.h"
+#include "hsep_linearised.h"
 
 static const hsep_real newton_lengths[] = {HSEP_NEWTON_LENGTHS};
-static const hsep_tolerance newton_tolerance = {HSEP_NEWTON_TOLERANCE};
 
 HSEP_ASSERT(lengths, sizeof newton_lengths == HSEP_NEWTON_TRIES * sizeof(hsep_real));
 
@@ -32,7 +32,7 @@ HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_p
     self->weight = hsep_take(&end, preview);
     self->corrected = hsep_take(&end, (hsep_real)n);
     self->begins = hsep_take(&end, m);
-    self->shapes = hsep_take(&end, HSEP_NEWTON_SHAPES * (hsep_real)spacing);
+    self->shapes = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
     self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
     self->gram = hsep_take(&end, hsep_triangle(knots.m));
     self->W = hsep_take(&end, m * preview);
@@ -64,7 +64,7 @@ static void newton_command(hsep_newton *self, const hsep_newton_task *task, cons
     }
 }
 
-/* Whether the unmodified commands, and the physics model behind them, outgrow what is learned by HSEP_PLANNING_FASTER:
+/* Whether the unmodified commands, and the physics model's answer, outgrow what is learned by HSEP_PLANNING_FASTER:
  * in their largest change from sample to sample over the plan and the late samples. */
 static int newton_outgrows(hsep_newton *self, const hsep_newton_task *task)
 {
@@ -111,14 +111,15 @@ static hsep_real newton_doubt(hsep_newton *self, const hsep_newton_task *task)
 /* Samples that the splines begin with, which are solved for. */
 static hsep_int *newton_begins(hsep_newton *self) { return hsep_part(self, self->begins); }
 
-/* A spline with this distance of knots. */
-static hsep_linearised_change newton_shape(hsep_newton *self, const hsep_planner *planner, hsep_int level)
+/* A spline with this distance of knots, (preview,), and it behind G_pb, likewise. */
+static hsep_real *newton_shape(hsep_newton *self, hsep_int level)
 {
-    const hsep_int width = 4 * hsep_planner_splines(planner)->spacing;
-    return (hsep_linearised_change){
-        .commands = hsep_at(self, self->shapes) + (((hsep_int)1 << level) - 1) * width,
-        .n = width << level,
-        .passed = hsep_at(self, self->passed) + level * self->preview};
+    return hsep_at(self, self->shapes) + level * self->preview;
+}
+
+static hsep_real *newton_passed(hsep_newton *self, hsep_int level)
+{
+    return hsep_at(self, self->passed) + level * self->preview;
 }
 
 /* Begin the physics model's plan at the remainder of the last one, which was predicted last: W' W, W' error. */
@@ -126,17 +127,14 @@ static void newton_open(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *weight = hsep_at(self, self->weight);
     hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
-    hsep_planner_open(task->planner, task->x_d);
-    if (self->is_physics) {
-        hsep_planner_may_turn(task->planner);
-    }
+    const hsep_real change = hsep_averaged_doubts(task->model) ? 1.0 : self->bound;
+    hsep_planner_open(task->planner, task->x_d, self->is_physics > 0, change);
     for (hsep_int k = 0; k < self->preview; k++) {
         target[k] = weight[k] * weight[k] * (task->x_d[k] - task->predictor->start - x_pb[self->preview - 1 - k]);
     }
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_int level = hsep_knots_at(&task->planner->knots, i).level, begin = newton_begins(self)[i];
-        const hsep_real *passed = newton_shape(self, task->planner, level).passed;
-        v[i] = hsep_dot(passed, target + begin, self->preview - begin);
+        v[i] = hsep_dot(newton_passed(self, level), target + begin, self->preview - begin);
     }
     hsep_copy(hsep_planner_quadratic(task->planner), hsep_at(self, self->gram), (hsep_int)hsep_triangle(self->m));
     hsep_planner_complete(task->planner, task->planner->jerk_weight);
@@ -159,8 +157,8 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
     const hsep_knot knot = hsep_knots_at(&task->planner->knots, first);
     const hsep_int apart = spacing << knot.level, from = newton_begins(self)[first];
     if (first == knot.first) {
-        const hsep_linearised_change change = newton_shape(self, task->planner, knot.level);
-        hsep_linearised_begin(linearised, task->model, &change);
+        hsep_linearised_begin(
+            linearised, task->model, newton_shape(self, knot.level), newton_passed(self, knot.level), 4 * apart);
     }
     for (hsep_int c = 0; c < count; c++) {
         columns[c] = hsep_at(self, self->W) + ((first + c) * self->preview + from + c * apart);
@@ -175,16 +173,13 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
     self->spline += count;
 }
 
-/* Some rows of the programme of a Newton step, P = W' W, and of its linear term. */
+/* The programme of a Newton step, P = W' W, and its linear term. */
 static void newton_products(hsep_newton *self, hsep_planner *planner)
 {
-    const hsep_int m = self->m, preview = self->preview, first = self->spline;
-    const hsep_int end = hsep_min(first + HSEP_NEWTON_PRODUCTS, m);
+    const hsep_int m = self->m, preview = self->preview, *begins = newton_begins(self);
     const hsep_real *W = hsep_at(self, self->W), *target = hsep_at(self, self->target);
-    const hsep_int *begins = newton_begins(self);
-    hsep_real *v = hsep_planner_linear(planner);
-    hsep_real *P = hsep_planner_quadratic(planner) + (first * m - first * (first - 1) / 2);
-    for (hsep_int i = first; i < end; i++) {
+    hsep_real *v = hsep_planner_linear(planner), *P = hsep_planner_quadratic(planner);
+    for (hsep_int i = 0; i < m; i++) {
         for (hsep_int j = i; j < m; j += 4) {
             const hsep_int count = hsep_min(m - j, 4);
             const hsep_real *rights[4];
@@ -205,36 +200,6 @@ static void newton_products(hsep_newton *self, hsep_planner *planner)
         }
         v[i] = hsep_dot(W + i * preview + begins[i], target + begins[i], preview - begins[i]);
     }
-    self->spline = end;
-}
-
-/* Splines of each distance of knots, and what they give with the physics model alone. */
-static void newton_shape_all(hsep_newton *self, hsep_planner *plans, const hsep_real spline[])
-{
-    const hsep_splines *splines = hsep_planner_splines(plans);
-    const hsep_int spacing = splines->spacing, preview = self->preview;
-    const hsep_real *weight = hsep_at(self, self->weight), *b = hsep_splines_shape(splines);
-    for (hsep_int i = 0; i < self->m; i++) {
-        const hsep_knot knot = hsep_knots_at(&plans->knots, i);
-        const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
-        const hsep_linearised_change change = newton_shape(self, plans, knot.level);
-        newton_begins(self)[i] = begin;
-        hsep_zero(change.commands, change.n);
-        hsep_zero(change.passed, preview);
-        for (hsep_int j = 0; j < knot.length; j++) {
-            hsep_axpy(change.commands + j * spacing, knot.share[j], b, 4 * spacing);
-            if (j * spacing < preview) {
-                hsep_axpy(change.passed + j * spacing, knot.share[j], spline, preview - j * spacing);
-            }
-        }
-        for (hsep_int k = begin; k < preview; k++) {
-            hsep_at(self, self->W)[i * preview + k] = weight[k] * change.passed[k - begin];
-        }
-    }
-    while (self->spline < self->m) {
-        newton_products(self, plans);
-    }
-    hsep_copy(hsep_at(self, self->gram), hsep_planner_quadratic(plans), (hsep_int)hsep_triangle(self->m));
 }
 
 HSEP_API void hsep_newton_init(
@@ -244,32 +209,32 @@ HSEP_API void hsep_newton_init(
     self->share = 1.0;
     self->reach = HSEP_NEWTON_FIRST_REACH;
     hsep_linearised_init(hsep_part(self, self->linearised), parameters);
-    const hsep_int half = self->preview / 2, begin = self->Np > half ? self->Np : half, falling = self->preview - begin;
+    const hsep_splines *splines = hsep_planner_splines(plans);
+    const hsep_int spacing = splines->spacing, preview = self->preview, half = preview / 2;
+    const hsep_int full = self->Np > half ? self->Np : half; /* errors that count in full; later ones fall */
+    const hsep_real *b = hsep_splines_shape(splines);
     hsep_real *weight = hsep_at(self, self->weight);
-    for (hsep_int k = 0; k < self->preview; k++) {
-        const hsep_real left = (hsep_real)(self->preview - k) / (hsep_real)(falling + 1);
-        weight[k] = k < begin ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
+    for (hsep_int k = 0; k < preview; k++) {
+        const hsep_real left = (hsep_real)(preview - k) / (hsep_real)(preview - full + 1);
+        weight[k] = k < full ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
     }
-    newton_shape_all(self, plans, spline);
-}
-
-/* Steps of the solver for the physics model's plan, and for a Newton step. */
-static hsep_int newton_physics_steps(const hsep_newton *self)
-{
-    return self->follows ? HSEP_NEWTON_PHYSICS_STEPS : newton_tolerance.steps;
-}
-
-/* Do a part of the solution of a programme in so many steps: its factor and whether bounds allow it; the solver's. */
-static void newton_solve(hsep_newton *self, const hsep_newton_task *task, hsep_int steps)
-{
-    hsep_tolerance tolerance = newton_tolerance;
-    tolerance.steps = steps;
-#ifdef HSEP_FLOAT32
-    tolerance.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
-#endif
-    self->status = self->status == HSEP_PLAN_OPEN        ? hsep_planner_solve(task->planner, &tolerance)
-                   : hsep_planner_advance(task->planner) ? HSEP_PLAN_DONE
-                                                         : HSEP_PLAN_BOUNDED;
+    for (hsep_int i = 0; i < self->m; i++) { /* splines of each distance of knots, and W with the physics model alone */
+        const hsep_knot knot = hsep_knots_at(&plans->knots, i);
+        const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
+        hsep_real *shape = newton_shape(self, knot.level), *passed = newton_passed(self, knot.level);
+        newton_begins(self)[i] = begin;
+        hsep_zero(shape, preview);
+        hsep_zero(passed, preview);
+        for (hsep_int j = 0; j < knot.length; j++) {
+            hsep_axpy(shape + j * spacing, knot.share[j], b, 4 * spacing);
+            hsep_axpy(passed + j * spacing, knot.share[j], spline, preview - j * spacing);
+        }
+        for (hsep_int k = begin; k < preview; k++) {
+            hsep_at(self, self->W)[i * preview + k] = weight[k] * passed[k - begin];
+        }
+    }
+    newton_products(self, plans);
+    hsep_copy(hsep_at(self, self->gram), hsep_planner_quadratic(plans), (hsep_int)hsep_triangle(self->m));
 }
 
 /* Half of the change of velocity that the slope of the next Newton step is taken over: a share of what this one changes
@@ -297,14 +262,12 @@ static void newton_judge(hsep_newton *self, const hsep_newton_task *task)
 {
     hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
     const hsep_real cost = newton_cost(self, task, c);
-    self->tries++;
     if (newton_better(cost, self->cost)) {
         self->gains = 1;
-        self->tries = HSEP_NEWTON_TRIES;
         self->cost = cost;
         newton_copy(self, best, c);
-    } else if (self->tries < HSEP_NEWTON_TRIES) {
-        const hsep_real shorter = newton_lengths[self->tries] / newton_lengths[self->tries - 1];
+    } else if (self->tries + 1 < HSEP_NEWTON_TRIES) {
+        const hsep_real shorter = newton_lengths[self->tries + 1] / newton_lengths[self->tries];
         for (hsep_int j = HSEP_N_DECIDED; j < HSEP_N_DECIDED + self->n; j++) {
             c[j] = best[j] + shorter * (c[j] - best[j]);
         }
@@ -367,162 +330,107 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
-/* Work is counted in multiply-adds of loops over arrays. As so many counts a number that is computed apart, with
- * branches, divisions or loads for itself alone; and a sample of a mode. */
-#define NEWTON_NUMBER 20.0
-#define NEWTON_MODE 9.0
+/* What parts of a plan count as: what passes through the model or the solver once, for all samples of a plan; some
+ * variances, or the bounds of a plan; columns abreast, with several experts; and half a prediction of a plan. */
+#define NEWTON_PASS 8
+#define NEWTON_SOME 4
+#define NEWTON_COLUMNS 6
+#define NEWTON_PREDICTION 9
 
-/* Multiply-adds of the parts of a plan, counted from the sizes. */
-typedef struct {
-    hsep_real number;    /* one of every sample of the plan */
-    hsep_real commands;  /* commands of a plan, and their disturbances */
-    hsep_real sample;    /* a sample of its prediction, with its variance, */
-    hsep_real row;       /* and a row of features for variances */
-    hsep_real predict;   /* half of a prediction without variances, and of its cost */
-    hsep_real linearise; /* slopes of the disturbances, and gains with them, */
-    hsep_real column;    /* and a sample of the changes by some splines abreast */
-    hsep_real open;      /* a programme that is not of a Newton step, */
-    hsep_real solve;     /* the factor of one, its bounds, and whether they allow its minimum, */
-    hsep_real step;      /* and a part of a solver's step */
-} newton_work;
+/* Parts into which a count is cut, each of at most so many. */
+static hsep_int newton_parts(hsep_int count, hsep_int most) { return (count + most - 1) / most; }
 
-static newton_work newton_work_of(const hsep_newton *self, const hsep_newton_task *task)
+/* What half a step of the solver counts as, */
+static hsep_int newton_of_half(const hsep_newton *self) { return self->m / 7; }
+
+/* the programme of a Newton step, */
+static hsep_int newton_of_products(const hsep_newton *self) { return self->m / 4; }
+
+/* and columns abreast from one on. */
+static hsep_int newton_of_columns(hsep_newton *self, hsep_int first)
 {
-    const hsep_physics *physics = hsep_part_const(self, self->physics);
-    const hsep_real all = (hsep_real)(self->preview + self->late);
-    const hsep_real modes = NEWTON_MODE * (hsep_real)physics->n_modes;
-    const hsep_real n = (hsep_real)(self->ends ? task->planner->knots.n : self->m), pairs = n * n;
-    newton_work work = {.number = NEWTON_NUMBER * (hsep_real)self->preview, .column = 1.0};
-    hsep_real run = HSEP_N_EXPERTS * NEWTON_NUMBER; /* the stack */
-    work.sample = run;
-    for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
-        if (task->model->predicted[i]) {
-            const hsep_expert *expert = hsep_averaged_expert(task->model, i);
-            const hsep_real m = (hsep_real)(expert->p + expert->n_static);
-            run += m + 3.0 * NEWTON_NUMBER;                     /* in free run, within bounds, shrunk */
-            work.sample += 2.0 * m + all + 3.0 * NEWTON_NUMBER; /* with the variances before it */
-            work.row += 0.5 * m * (m + NEWTON_NUMBER);
-            if (hsep_averaged_kind_of(task->model, i) == HSEP_MODEL_RESIDUAL && task->model->shares[i] > 0.0) {
-                work.column += 0.7 * (hsep_real)expert->p + modes + 16.0; /* early: less p */
-            }
-        }
+    return newton_parts(NEWTON_COLUMNS * (self->preview - newton_begins(self)[first]), self->preview);
+}
+
+/* What all parts of the longest plan count as, samples of whose window are predicted already. A second length of a
+ * Newton step, rarely tried, adds a prediction. */
+static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, hsep_int predicted)
+{
+    const hsep_int window = self->late + self->Np, beyond = self->preview - self->Np;
+    const hsep_int variances = newton_parts(window - predicted, HSEP_NEWTON_VARIED) +
+                               newton_parts(beyond, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) +
+                               newton_parts(window, HSEP_NEWTON_VARIED);
+    const hsep_int of_physics =
+        NEWTON_PASS + 2 * newton_of_half(self) * HSEP_NEWTON_PHYSICS_STEPS + 2 * NEWTON_PREDICTION;
+    hsep_int step = 2 * NEWTON_PASS + NEWTON_SOME + newton_of_products(self) +
+                    2 * newton_of_half(self) * planner->steps + 2 * NEWTON_PREDICTION;
+    for (hsep_int i = 0; i < self->m; i += newton_together(planner, i)) {
+        step += newton_of_columns(self, i);
     }
-    /* tanh counts as two; change, command, x_pb, velocity, two of the position; what is filtered */
-    work.commands = all * NEWTON_NUMBER * (2.0 * HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS + 6.0) +
-                    all * modes * (HSEP_DISTURBANCES_OF_COMMAND + 4.0);
-    work.predict = 0.5 * (work.commands + all * run + 9.0 * work.number); /* four splines, differences, error, cost */
-    work.linearise = all * NEWTON_NUMBER * (3.0 * HSEP_FEATURES_N_FRICTION + 14.0);
-    work.open = 20.0 * work.number + 5.0 * pairs;
-    /* row, bound, slack, multiplier of each order */
-    work.solve = 5.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.5);
-    work.step = (10.0 * HSEP_ORDERS * work.number + pairs * (n / 6.0 + 3.0)) / HSEP_INTERIOR_PARTS;
-    return work;
+    return NEWTON_SOME * (variances + 1) + of_physics + self->n_steps * step + NEWTON_PASS;
 }
 
-/* Products of the columns of some splines with all behind them. */
-static hsep_real newton_of_products(hsep_newton *self, hsep_int begin, hsep_int end)
+/* Predict more samples under a plan, up to one; the first ones with its commands. apart: as hsep_averaged_go_on's. */
+static void newton_predict(
+    hsep_newton *self, const hsep_newton_task *task, const hsep_real c[], hsep_int last, hsep_int apart)
 {
-    hsep_real sum = 0.0;
-    for (hsep_int i = begin; i < end && i < self->m; i++) {
-        const hsep_int length = self->preview - newton_begins(self)[i];
-        sum += 0.7 * (hsep_real)(self->m - i) * ((hsep_real)length + NEWTON_NUMBER);
-    }
-    return sum;
-}
-
-/* Columns from one on, with what begins the linearisation of a distance of knots. */
-static hsep_real newton_of_columns(
-    hsep_newton *self, const hsep_planner *planner, const newton_work *work, hsep_int first)
-{
-    const hsep_real length = (hsep_real)(self->preview - newton_begins(self)[first]);
-    const int is_first = hsep_knots_at(&planner->knots, first).first == first;
-    return HSEP_PHYSICS_ABREAST * length * work->column + (is_first ? 6.0 * work->number : 0.0);
-}
-
-/* Predict the next part of the samples under a plan: with its commands the first ones, then half of all each time; with
- * variances a few, one for each in the window. Return what it takes; without a plan it is counted only. */
-static hsep_real newton_predict(
-    hsep_newton *self, const hsep_newton_task *task, const newton_work *work, const hsep_real c[], int varies)
-{
-    const hsep_int first = self->samples, all = self->late + self->preview, window = self->late + self->Np;
-    const hsep_int apart = !varies ? 0 : first < window ? 1 : HSEP_NEWTON_APART; /* as hsep_averaged_go_on has it */
-    const hsep_int most = varies ? apart * HSEP_NEWTON_VARIED : first == 0 ? all / HSEP_NEWTON_AT_FIRST : all / 2;
-    const hsep_int count = hsep_min((apart == 1 ? window : all) - first, most);
     hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
-    if (c != NULL && first == 0) {
+    if (self->samples == 0) {
         newton_command(self, task, c, HSEP_N_DECIDED + self->n);
-        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, count, apart);
-    } else if (c != NULL) {
-        hsep_averaged_go_on(task->model, x_pb, e_h, first, first + count, apart);
+        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, last, apart);
+    } else {
+        hsep_averaged_go_on(task->model, x_pb, e_h, self->samples, last, apart);
     }
-    self->samples += c != NULL ? count : 0;
-    if (!varies) {
-        return first == 0 ? work->predict : 0.5 * work->predict;
-    }
-    const hsep_real rows = (hsep_real)((count + apart - 1) / apart);
-    return (hsep_real)count * work->sample + rows * work->row + (first == 0 ? work->commands : 0.0);
+    self->samples = last;
 }
 
-/* The work that is left of a plan, nearly always at most, where it begins, or behind the Newton steps. */
-static hsep_real newton_left(hsep_newton *self, const hsep_newton_task *task, const newton_work *work)
+/* Predict the next ones with variances, one for each sample in the window, and one for some behind it. */
+static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[])
 {
-    const hsep_int window = self->late + self->Np, behind = self->preview - self->Np, first = self->samples;
-    const hsep_real parts = HSEP_INTERIOR_PARTS * work->step;
-    hsep_real left = work->commands + (hsep_real)window * (work->sample + work->row);
-    left += hsep_planner_carrying(task->planner);
-    left += self->judges ? 2.0 * work->predict : 0.0; /* of the physics model's plan */
-    if (self->place > 0) {
-        return left;
-    }
-    if (self->judges) {
-        left += (hsep_real)(window - first + behind) * work->sample +
-                (hsep_real)(window - first + behind / HSEP_NEWTON_APART + 1) * work->row;
-    }
-    if (self->planned) {
-        left += work->open + work->solve + (hsep_real)newton_physics_steps(self) * parts;
-    }
-    if (self->ends) {
-        left += work->open + work->solve + (hsep_real)newton_tolerance.steps * parts;
-    }
-    if (self->follows) {
-        hsep_real newton = work->linearise + newton_of_products(self, 0, self->m) + work->solve +
-                           3.0 * work->predict; /* one length of it is enough nearly always */
-        for (hsep_int i = 0; i < self->m; i += newton_together(task->planner, i)) {
-            newton += newton_of_columns(self, task->planner, work, i);
-        }
-        left += (hsep_real)self->n_steps * (newton + (hsep_real)newton_tolerance.steps * parts);
-    }
-    return left;
+    const hsep_int window = self->late + self->Np, apart = self->samples < window ? 1 : HSEP_NEWTON_APART;
+    const hsep_int end = apart == 1 ? window : self->late + self->preview;
+    newton_predict(self, task, c, hsep_min(self->samples + apart * HSEP_NEWTON_VARIED, end), apart);
 }
 
-/* Cut a plan: what follows costs so much, and is done when newton_go_on is called again; where: another one for each. A
- * switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006), with what the block has. */
-#define NEWTON_YIELD(where, cost) \
+/* Cut a plan: what follows counts as so much, and is done when newton_go_on is called again; where: another one for
+ * each. A switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006), with what the block
+ * has. */
+#define NEWTON_MADE 99 /* place behind the last yield */
+#define NEWTON_YIELD(where, count) \
     do { \
         self->place = (where); \
-        self->next = (cost); \
+        self->next = (count); \
         return; \
     case (where):; \
     } while (0)
 
-/* Predict more samples under a plan, up to one. */
-#define NEWTON_PREDICT(where, end, c, varies) \
+/* Predict a plan without variances. */
+#define NEWTON_PREDICT(where, then, c) \
+    self->samples = 0; \
+    NEWTON_YIELD(where, NEWTON_PREDICTION); \
+    newton_predict(self, task, c, all / 8, 0); \
+    NEWTON_YIELD(then, NEWTON_PREDICTION); \
+    newton_predict(self, task, c, all, 0)
+
+/* Predict more samples of the plan with variances, up to one. */
+#define NEWTON_VARY(where, end) \
     while (self->samples < (end)) { \
-        NEWTON_YIELD(where, newton_predict(self, task, &work, NULL, varies)); \
-        (void)newton_predict(self, task, &work, c, varies); \
+        NEWTON_YIELD(where, NEWTON_SOME + (self->samples > 0 ? 0 : NEWTON_PASS)); \
+        newton_vary(self, task, c); \
     }
 
-/* Solve a programme in so many steps of its solver. */
-#define NEWTON_SOLVE(where, steps) \
-    for (self->status = HSEP_PLAN_OPEN; self->status >= HSEP_PLAN_BOUNDED;) { \
-        NEWTON_YIELD(where, self->status == HSEP_PLAN_OPEN ? work.solve : work.step); \
-        newton_solve(self, task, steps); \
+/* Solve a programme in a number of steps of its solver. */
+#define NEWTON_SOLVE(where, then, steps) \
+    NEWTON_YIELD(where, NEWTON_PASS); \
+    self->status = hsep_planner_solve(planner, steps); \
+    while (self->status == HSEP_PLAN_BOUNDED) { \
+        NEWTON_YIELD(then, newton_of_half(self)); \
+        self->status = hsep_planner_advance(planner); \
     }
 
 /* Make a plan, from one yield to the next. */
 static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 {
-    const newton_work work = newton_work_of(self, task);
     const hsep_int all = self->late + self->preview;
     hsep_planner *planner = task->planner;
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
@@ -533,7 +441,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         /* The remainder of the last plan, with the variances of all plans, which have a stack of their own */
         hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), self->samples);
         if (self->judges) {
-            NEWTON_PREDICT(1, all, rest, 1)
+            NEWTON_VARY(1, all)
             self->cost = newton_cost(self, task, rest);
             self->doubt = newton_doubt(self, task);
         }
@@ -541,9 +449,9 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            NEWTON_YIELD(2, work.open);
+            NEWTON_YIELD(2, NEWTON_SOME);
             newton_open(self, task);
-            NEWTON_SOLVE(3, newton_physics_steps(self))
+            NEWTON_SOLVE(3, 4, self->follows ? HSEP_NEWTON_PHYSICS_STEPS : planner->steps)
             self->planned = self->status == HSEP_PLAN_DONE;
         }
         newton_copy(self, of_physics, c);
@@ -555,95 +463,73 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->cost_of_rest = self->cost;
         if (self->ends) {
             newton_copy(self, c, rest);
-            NEWTON_YIELD(4, work.open);
+            NEWTON_YIELD(5, NEWTON_SOME);
             hsep_planner_end(planner, task->x_d);
-            NEWTON_SOLVE(5, newton_tolerance.steps)
+            NEWTON_SOLVE(6, 7, planner->steps)
         }
 
         /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
-        if (self->follows) {
-            newton_copy(self, hsep_at(self, self->best), rest);
-            newton_copy(self, c, rest);
-        }
+        newton_copy(self, hsep_at(self, self->best), rest);
         self->gains = 1;
         for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
             if (!self->gains) { /* what was predicted last was no better */
-                self->samples = 0;
-                NEWTON_PREDICT(15, all, hsep_at(self, self->best), 0)
+                NEWTON_PREDICT(8, 9, hsep_at(self, self->best));
             }
-            if (self->steps > 0) {
-                NEWTON_YIELD(16, work.open);
-                newton_copy(self, c, hsep_at(self, self->best));
-                hsep_planner_open(planner, task->x_d);
-            }
-            hsep_planner_may_turn(planner); /* the model follows the friction */
-            planner->change = self->bound;
-            NEWTON_YIELD(7, work.linearise);
+            NEWTON_YIELD(10, NEWTON_SOME);
+            newton_copy(self, c, hsep_at(self, self->best));
+            hsep_planner_open(planner, task->x_d, 1, self->bound); /* the model follows the friction */
+            NEWTON_YIELD(11, NEWTON_PASS);
             (void)newton_errors(self, task);
             hsep_linearised_at(
                 hsep_part(self, self->linearised), task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb),
                 self->reach);
             for (self->spline = 0; self->spline < self->m;) {
-                NEWTON_YIELD(8, newton_of_columns(self, planner, &work, self->spline));
+                NEWTON_YIELD(12, newton_of_columns(self, self->spline));
                 newton_columns(self, task);
             }
-            for (self->spline = 0; self->spline < self->m;) {
-                NEWTON_YIELD(9, newton_of_products(self, self->spline, self->spline + HSEP_NEWTON_PRODUCTS));
-                newton_products(self, planner);
-            }
+            NEWTON_YIELD(13, newton_of_products(self));
+            newton_products(self, planner);
             hsep_planner_complete(planner, planner->jerk_weight);
-            NEWTON_SOLVE(10, newton_tolerance.steps)
+            NEWTON_SOLVE(14, 15, planner->steps)
             self->gains = 0;
-            self->tries = HSEP_NEWTON_TRIES;
             if (self->status != HSEP_PLAN_FAILED) {
                 self->wider = hsep_fmin(HSEP_NEWTON_WIDER * self->reach, HSEP_NEWTON_MOST_REACH);
                 self->reach = newton_next_reach(self, task);
                 self->wider = hsep_fmax(self->reach, self->wider);
-                self->tries = 0;
             }
-            while (self->tries < HSEP_NEWTON_TRIES) {
-                self->samples = 0;
-                NEWTON_PREDICT(11, all, c, 0)
+            self->tries = self->status != HSEP_PLAN_FAILED ? 0 : HSEP_NEWTON_TRIES;
+            for (; !self->gains && self->tries < HSEP_NEWTON_TRIES; self->tries++) {
+                NEWTON_PREDICT(16, 17, c);
                 newton_judge(self, task);
             }
         }
 
         /* The best of them and the physics model's plan */
-        self->left = newton_left(self, task, &work);
         if (self->judges) {
-            self->samples = 0;
-            NEWTON_PREDICT(12, all, of_physics, 0)
+            NEWTON_PREDICT(18, 19, of_physics);
             newton_compare(self, task);
         }
 
         /* What of it may be carried out */
-        if (hsep_planner_carrying(planner) > 0.0) {
-            NEWTON_YIELD(13, hsep_planner_carrying(planner));
-            hsep_planner_carry_out(planner, task->x_d);
-        }
+        hsep_planner_carry_out(planner, task->x_d);
 
         /* The window under the plan, and its variances */
         self->samples = 0;
         hsep_averaged_weigh(task->model, HSEP_OF_PREDICTIONS, hsep_at(self, self->e_h), 0);
-        NEWTON_PREDICT(14, self->late + self->Np, c, 1)
-        break;
-    default:
-        break;
+        NEWTON_VARY(20, self->late + self->Np)
     }
-    self->place = 0;
-    self->next = 0.0;
+    self->place = NEWTON_MADE;
 }
 
-HSEP_API int hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples)
+HSEP_API void hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples)
 {
-    hsep_real done = 0.0, due;
-    do {
+    const hsep_int share = samples > 1 ? newton_parts(self->left, samples) : 0;
+    hsep_int done = 0;
+    while (self->place != NEWTON_MADE && (samples <= 1 || done == 0 || done + self->next <= share)) {
         done += self->next;
-        self->left -= self->next;
         newton_go_on(self, task);
-        due = samples > 1 ? (done + self->left) / (hsep_real)samples : INFINITY;
-    } while (self->place > 0 && done + 0.5 * self->next <= due);
-    return self->place == 0;
+    }
+    self->left -= hsep_min(done, self->left);
 }
 
 HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best)
@@ -664,7 +550,6 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
         path[self->preview - 1 - k] = task->x_d[k] - task->predictor->start;
     }
     self->bound = newton_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
-    task->planner->change = hsep_averaged_doubts(task->model) ? 1.0 : self->bound;
     newton_command(self, task, rest, HSEP_N_DECIDED + self->n);
     const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->samples = self->late + (pinned > 0 ? pinned : 1);
@@ -677,9 +562,7 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
     self->judges = self->planned && (hsep_real)predictor->k >= predictor->n_init && task->model->predicted[HSEP_STATIC];
     self->follows = self->judges && best > 1;
     self->ends = best == 0 && was_planned > 0;
-    hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), 0); /* work follows from shares */
-    const newton_work work = newton_work_of(self, task);
-    /* This sample has cost that; what is learned at the end of the last window costs as much as commands of a plan */
-    self->next = 3.0 * work.commands + (hsep_real)self->samples * (work.sample + work.row);
-    self->left = self->next + newton_left(self, task, &work);
+    /* This sample has begun, and learned the last window */
+    self->next = 2 * NEWTON_PASS + NEWTON_SOME * newton_parts(self->samples, HSEP_NEWTON_VARIED);
+    self->left = self->next + newton_of_plan(self, task->planner, self->samples);
 }

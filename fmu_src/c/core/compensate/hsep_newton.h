@@ -1,34 +1,30 @@
 /* Planner on the residual model with averaging, by Newton steps that follow the slope of its disturbances.
  *
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
- * delta. Each of one or two Gauss-Newton steps solves the quadratic programme of the model linearised at the best plan
- * so far, friction over what the step before changed, and goes to its minimum if that lowers the cost. Once it has
+ * delta. Each of one to three Gauss-Newton steps solves the quadratic programme of the model linearised at the best
+ * plan so far, friction over what the step before changed, and goes to its minimum if that lowers the cost. Once it has
  * learned, the averaged model judges all plans: its own, the physics model's, and the remainder of the last one; the
  * best is taken, of its own change of the last one a share. Where compensation is off a plan ends it.
  *
- * A plan is one function in reading order, cut by yields into short parts, each of which says what it costs;
- * hsep_newton_run does as many as a sample's equal share of the work that may be left.
+ * A plan is one function in reading order, cut by yields into short parts, each of which counts as a few; the longest
+ * plan is counted, and hsep_newton_run does a sample's equal share of it.
  */
 #ifndef HSEP_NEWTON_H
 #define HSEP_NEWTON_H
 
-#include "hsep_linearised.h"
 #include "hsep_physics.h"
 #include "hsep_planner.h"
 #include "hsep_predictor.h"
 #include "hsep_averaged_model.h"
 
-#define HSEP_NEWTON_TRIES 2    /* lengths of the last Newton step that are tried, */
-#define HSEP_NEWTON_VARIED 4   /* variances that are computed in a part, */
-#define HSEP_NEWTON_PRODUCTS 8 /* rows of a programme that are */
-#define HSEP_NEWTON_SHAPES 28  /* spacings of splines with knots 1, 2 and 4 of them apart: 4 each time */
-#define HSEP_NEWTON_AT_FIRST 8 /* the first part of a prediction has one of so many samples, and the commands */
+#define HSEP_NEWTON_TRIES 2  /* lengths of a Newton step that are tried */
+#define HSEP_NEWTON_VARIED 4 /* variances that are computed in a part */
 
 typedef struct {
     hsep_int preview, Np;
     hsep_int late;          /* samples before the window that are not measured yet: they are predicted, too */
     hsep_int n, m;          /* splines of a plan, and those that it is solved for */
-    hsep_int place;         /* yield behind which the plan goes on; 0: at its beginning */
+    hsep_int place;         /* yield after which the plan goes on; 0: at its beginning */
     hsep_int is_physics;    /* whether no better model than the physics model is allowed */
     hsep_int judges;        /* whether the averaged model judges plans, */
     hsep_int follows;       /* and whether it may plan */
@@ -48,22 +44,22 @@ typedef struct {
     hsep_real doubt;        /* m2, variance under the last plan's, weighted as errors */
     hsep_real bound;        /* share of change_max that bounds the averaged model's plan */
     hsep_real share;        /* of its change of the last plan that was taken last, but for what it doubts */
-    hsep_real next;         /* multiply-adds of the next part, 0: the plan is made; */
-    hsep_real left;         /* and that this part and all after it nearly always take */
+    hsep_int next;          /* what the next part counts as, */
+    hsep_int left;          /* and at most it and all after it, nearly always */
     hsep_int rest;          /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_int best;          /* (3 + n,) m, coefficients of the best plan so far */
     hsep_int of_physics;    /* (3 + n,) m, coefficients of the physics model's plan */
     hsep_int command;       /* (preview + late,) m, commands predicted last, relative to the start, newest first */
     hsep_int x_pb;          /* (preview + late,) m, their prediction by the physics model, */
-    hsep_int e_h;       /* (preview + late + p,) m, and what the averaged model adds; behind it the last residuals */
-    hsep_int target;    /* (preview,) m, work */
-    hsep_int weight;    /* (preview,) of the errors of a plan: they count less at its end */
-    hsep_int corrected; /* (n,) m, what the averaged model's last plan changed the one before by; 0 of any other */
-    hsep_int begins;    /* (m,) hsep_int, samples that the splines begin with, which are solved for */
-    hsep_int shapes;    /* (HSEP_NEWTON_SHAPES spacing,) splines of each distance of knots, one after the other, */
-    hsep_int passed;    /* (HSEP_KNOTS_LEVELS, preview) and these behind G_pb */
-    hsep_int gram;      /* triangle of m rows, W' W with G_pb alone */
-    hsep_int W;         /* (m, preview) weighted changes of x_h by splines, 0 before they begin */
+    hsep_int e_h;           /* (preview + late + p,) m, and what the averaged model adds; after it the last residuals */
+    hsep_int target;        /* (preview,) m, work */
+    hsep_int weight;        /* (preview,) of the errors of a plan: they count less at its end */
+    hsep_int corrected;     /* (n,) m, what the averaged model's last plan changed the one before by; 0 of any other */
+    hsep_int begins;        /* (m,) hsep_int, samples that the splines begin with, which are solved for */
+    hsep_int shapes;        /* (HSEP_KNOTS_LEVELS, preview) splines of each distance of knots, */
+    hsep_int passed;        /* (HSEP_KNOTS_LEVELS, preview) and these after G_pb */
+    hsep_int gram;          /* triangle of m rows, W' W with G_pb only */
+    hsep_int W;             /* (m, preview) weighted changes of x_h by splines, 0 before they begin */
     hsep_int linearised;
     hsep_int physics; /* G_pb at the beginning of the window, */
     hsep_int trial;   /* and for a trial */
@@ -82,18 +78,17 @@ typedef struct {
 HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_parameters *parameters);
 
 /* Fill the block, which is 0, with the planner that solves its plans and a spline filtered by the physics model,
- * (preview,), m/m. Cost: m^2 preview / 4 multiply-adds. */
+ * (preview,), m/m. */
 HSEP_API void hsep_newton_init(
     hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan, but only samples that the plan leaves as they are,
  * and late ones. best: best model allowed, 0 none, 1 physics, 2 averaged, which judges plans once the warm-up is over.
- * Cost: as hsep_averaged_forecast; late samples add late^2 / 2 for each expert, here and in the last part. */
+ */
 HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best);
 
-/* Do parts of the plan, at least one: this sample's equal share, to the nearest part, of the work that is left,
- * samples being left until the plan is due; all of it in the last one. Return whether the plan is made and predicted.
- * Cost of a plan: as newton_left has it; a second length of a Newton step, rarely tried, adds a prediction. */
-HSEP_API int hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples);
+/* Do parts of the plan: this sample's equal share of what is left, samples being left until the plan is due; all of it
+ * in the last one, in which the plan is made and the window predicted. */
+HSEP_API void hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, hsep_int samples);
 
 #endif

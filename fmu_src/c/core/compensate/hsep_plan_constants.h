@@ -15,10 +15,12 @@
 #define HSEP_QP_TAU 0.995
 #define HSEP_QP_STEPS 24
 #define HSEP_QP_EXACT 1e-15, 1e-09, 1e-11, 24, 10.0
-#define HSEP_QP_ROUNDING 1e-09
-#define HSEP_QP_INTERIOR 1e-10
-#define HSEP_QP_EXCEEDED 1.000001
-#define HSEP_QP_MOVES 1e-12
+
+/* hybridsep/compensate/limits.py */
+#define HSEP_LIMITS_ROUNDING 1e-09
+#define HSEP_LIMITS_INTERIOR 1e-10
+#define HSEP_LIMITS_EXCEEDED 1.000001
+#define HSEP_LIMITS_MOVES 1e-12
 
 /* hybridsep/compensate/newton.py */
 #define HSEP_NEWTON_APART 4

@@ -1,19 +1,18 @@
 #include "hsep_planner.h"
 
 #include "hsep_cholesky.h"
+#include "hsep_interior.h"
 
-#define HSEP_STOP_WORK 300.0 /* multiply-adds for each sample of the preview to carry out a plan */
-
-/* Stops of plans that are longer than the preview: behind the preview a plan takes the command to go on at its last
+/* Stops of plans that are longer than the preview: after the preview a plan takes the command to go on at its last
  * velocity. What comes may be another command, so each plan has a stop beside it: it shares the splines that are
  * carried out before the next plan, and then brings the change of the command to a constant within the preview, which
  * takes nothing of the limits of what follows. A plan is carried out as far as it has a stop within the limits;
  * otherwise the last stop goes on. */
 typedef struct {
     hsep_int preview; /* samples of the command that are known */
-    hsep_int shared;  /* splines that a stop has from its plan, those of a window and the next plan's pinned ones, */
+    hsep_int shared;  /* splines that a stop has from its plan, a window's and the next plan's pinned ones, */
     hsep_int n;       /* and those before all coefficients are alike */
-    hsep_int count;   /* coefficients: the decided ones and those of all splines that begin in the preview */
+    hsep_int count;   /* coefficients: the decided ones and of all splines that begin in the preview */
     hsep_int last;    /* (count,) m, the last stop, */
     hsep_int own;     /* (count,) m, by which it differs from one that stops as these do, */
     hsep_int now;     /* (count,) m, and the stop of the plan */
@@ -23,6 +22,25 @@ typedef struct {
     hsep_int start, way, own_rows; /* the last stop without its own part, the way to the plan's, and that part */
 } hsep_stop;
 HSEP_ASSERT_WORDS(hsep_stop, 13);
+
+/* Where the solver ends. */
+static hsep_tolerance planner_tolerance(hsep_int averaging)
+{
+    static const hsep_tolerance exact = {HSEP_QP_EXACT};
+    hsep_tolerance averaged = {HSEP_NEWTON_TOLERANCE};
+#ifdef HSEP_FLOAT32
+    averaged.margin = 1e-4F; /* rounding leaves up to 2e-4 of a bound of third differences */
+#endif
+    return averaging ? averaged : exact;
+}
+
+/* Where its programme is; x: the change that was found last. */
+static hsep_problem planner_problem(hsep_planner *self)
+{
+    return hsep_interior_problem(hsep_part(self, self->interior), hsep_planner_splines(self));
+}
+
+HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self) { return planner_problem(self).v; }
 
 /* Splines that a bounded plan leaves as they are. */
 static hsep_int planner_n_pinned(const hsep_predictor_parameters *parameters)
@@ -66,15 +84,16 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_predictor
     self->Np = parameters->settings.Np;
     self->n_pinned = planner_n_pinned(parameters);
     self->no_reversal = parameters->compensator.no_reversal;
+    self->averaging = parameters->averaging.averaging;
+    self->steps = planner_tolerance(self->averaging).steps;
     self->knots = hsep_planner_knots(parameters);
     self->jerk_weight = parameters->compensator.jerk_weight;
     self->c = hsep_take(&end, HSEP_N_DECIDED + (hsep_real)n);
     self->total = hsep_take(&end, HSEP_ORDERS * preview);
-    self->own = hsep_take(&end, HSEP_ORDERS * preview);
-    self->moves = hsep_take(&end, preview);
+    self->low = hsep_take(&end, HSEP_ORDERS * preview);
+    self->high = hsep_take(&end, HSEP_ORDERS * preview);
     self->third = hsep_take(&end, preview);
     self->P = hsep_take(&end, hsep_triangle(n));
-    self->factor = hsep_take(&end, hsep_triangle(n));
     self->splines = hsep_take_block(&end, hsep_splines_lay_out(&(hsep_splines){0}, parameters->horizon, spacing));
     self->interior = hsep_take_block(&end, hsep_interior_size(parameters->horizon, n));
     if (parameters->preview < parameters->horizon) {
@@ -94,7 +113,7 @@ static void stop_gains(hsep_stop *self, const hsep_splines *splines)
         of[order] = (splines->share[order] / unit) * (splines->share[order] / unit);
     }
     const hsep_real one = of[1], two = of[2], three = of[3];
-    hsep_real p11 = two + 2.0 * three, p12 = three, p22 = three; /* the difference behind the last spline is 0 */
+    hsep_real p11 = two + 2.0 * three, p12 = three, p22 = three; /* the difference after the last spline is 0 */
     for (hsep_int i = self->n - self->shared; i-- > 0;) {
         const hsep_real both = p12 + p22, total = one + two + three + p11 + p12 + both;
         const hsep_real g1 = (two + three + both) / total, g2 = three / total, h1 = g1 - 1.0, h2 = g2 - 1.0;
@@ -117,7 +136,6 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_predictor_paramet
         settings->change_max, settings->v_max * T_s, settings->a_max * (T_s * T_s),
         settings->j_max * (T_s * T_s * T_s)};
     (void)hsep_planner_lay_out(self, parameters);
-    self->change = 1.0;
     for (int i = 0; i < 3; i++) {
         self->x_d_before[i] = start;
     }
@@ -131,15 +149,16 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_predictor_paramet
 }
 
 /* Rows of x_dm, (4 preview,) in shares, under the first count coefficients of the remainder of the last plan; of order
- * 0 of the change alone. exceeded: as hsep_splines_exceeded has it. */
-static void planner_totals(
-    const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int preview, hsep_real total[],
-    hsep_real exceeded[])
+ * 0 of only the change. low, high: the limits, with a share of change_max. Where x_d itself exceeds one within the
+ * length of a spline, as a command that is held or rounded does, what it takes is added to the limit. */
+static void planner_limits(
+    const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int preview, hsep_real change_max,
+    hsep_real total[], hsep_real low[], hsep_real high[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     /* apart: a sum would be rounded to what a position is, much coarser than a third difference of a change */
     hsep_real path[HSEP_ORDERS], change[HSEP_ORDERS];
-    hsep_splines_exceeded(splines, x_d, self->x_d_before, preview, exceeded);
+    hsep_splines_exceeded(splines, x_d, self->x_d_before, preview, high);
     hsep_differ_from(path, self->x_d_before);
     hsep_differ_from(change, self->delta_before);
     for (hsep_int k = 0; k < preview; k++) {
@@ -149,6 +168,11 @@ static void planner_totals(
         for (unsigned order = 1; order < HSEP_ORDERS; order++) {
             total[order * preview + k] = (path[order] + change[order]) * splines->share[order];
         }
+    }
+    for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
+        const hsep_real exceeded = high[r], most = (1.0 - HSEP_LIMITS_ROUNDING) * (r < preview ? change_max : 1.0);
+        low[r] = hsep_fmin(exceeded, 0.0) - most;
+        high[r] = hsep_fmax(exceeded, 0.0) + most;
     }
 }
 
@@ -166,54 +190,37 @@ static hsep_real planner_third(const hsep_planner *self, const hsep_real c[], hs
     return squares;
 }
 
-HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[])
+HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], int may_turn, hsep_real change)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int count = HSEP_N_DECIDED + splines->n, preview = splines->preview;
-    hsep_real *moves = hsep_at(self, self->moves), last = self->x_d_before[2];
+    hsep_real *total = hsep_at(self, self->total), *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
     self->changes = 1;
     self->solved = self->knots;
-    planner_totals(self, x_d, count, preview, hsep_at(self, self->total), hsep_at(self, self->own));
+    planner_limits(self, x_d, count, preview, change, total, low, high);
     (void)planner_third(self, hsep_at(self, self->c), count, hsep_at(self, self->third));
-    for (hsep_int k = 0; k < preview; k++) {
-        const hsep_real step = x_d[k] - last;
-        moves[k] = self->no_reversal ? (hsep_real)((step > HSEP_QP_MOVES) - (step < -HSEP_QP_MOVES)) : 0.0;
-        last = x_d[k];
+    for (hsep_int k = 0; k < preview && self->no_reversal && !may_turn; k++) { /* velocities */
+        const hsep_real step = x_d[k] - (k > 0 ? x_d[k - 1] : self->x_d_before[2]);
+        low[preview + k] = step > HSEP_LIMITS_MOVES ? 0.0 : low[preview + k];
+        high[preview + k] = step < -HSEP_LIMITS_MOVES ? 0.0 : high[preview + k];
     }
-}
-
-/* Bounds of a row, in shares. Where x_d itself exceeds a limit within the length of a spline, as a command that is held
- * or rounded does, what it takes is added to the limit. The remainder of the last plan is always feasible, with a small
- * margin: an interior-point method needs an interior. */
-static inline void planner_range(const hsep_planner *self, hsep_int r, hsep_real *least, hsep_real *most)
-{
-    const hsep_int preview = hsep_planner_splines(self)->preview;
-    const hsep_real total = hsep_at_const(self, self->total)[r];
-    const hsep_real own = hsep_at_const(self, self->own)[r];
-    *most = (1.0 - HSEP_QP_ROUNDING) * (r < preview ? self->change : 1.0);
-    *least = -*most + hsep_fmin(own, 0.0);
-    *most += hsep_fmax(own, 0.0);
-    if (r >= preview && r < 2 * preview) { /* velocities */
-        const hsep_real moves = hsep_at_const(self, self->moves)[r - preview];
-        *least = moves > 0.0 ? 0.0 : *least;
-        *most = moves < 0.0 ? 0.0 : *most;
+    /* The remainder is always feasible, with a small margin: an interior-point method needs an interior */
+    for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
+        low[r] = hsep_fmin(low[r], total[r] - HSEP_LIMITS_INTERIOR);
+        high[r] = hsep_fmax(high[r], total[r] + HSEP_LIMITS_INTERIOR);
     }
-    *least = hsep_fmin(*least, total - HSEP_QP_INTERIOR);
-    *most = hsep_fmax(*most, total + HSEP_QP_INTERIOR);
 }
 
 /* Largest feasible length, 0 ... 1, of a step with rows way from a plan, with rows of the remainder + from. */
 static hsep_real planner_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[])
 {
     const hsep_real *total = hsep_at_const(self, self->total);
-    const hsep_int rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
+    const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);
     hsep_real share = 1.0;
-    for (hsep_int r = 0; r < rows; r++) {
-        hsep_real least, most;
-        planner_range(self, r, &least, &most);
+    for (hsep_int r = 0; r < HSEP_ORDERS * hsep_planner_splines(self)->preview; r++) {
         const hsep_real here = total[r] + from[r];
-        const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? most - here : here - least;
-        if (to > HSEP_QP_ROUNDING && room < share * to) {
+        const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? high[r] - here : here - low[r];
+        if (to > HSEP_LIMITS_ROUNDING && room < share * to) {
             share = room / to;
         }
     }
@@ -224,16 +231,13 @@ static hsep_real planner_share(const hsep_planner *self, const hsep_real from[],
 static int planner_allow(const hsep_planner *self, const hsep_real way[])
 {
     const hsep_real *total = hsep_at_const(self, self->total);
-    const hsep_int rows = HSEP_ORDERS * hsep_planner_splines(self)->preview;
-    for (hsep_int r = 0; r < rows; r++) {
+    const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);
+    int allow = 1;
+    for (hsep_int r = 0; r < HSEP_ORDERS * hsep_planner_splines(self)->preview; r++) {
         const hsep_real there = total[r] + way[r];
-        hsep_real least, most;
-        planner_range(self, r, &least, &most);
-        if (!(there <= most && there >= least)) {
-            return 0;
-        }
+        allow = allow && there <= high[r] && there >= low[r];
     }
-    return 1;
+    return allow;
 }
 
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[])
@@ -247,21 +251,16 @@ static hsep_int planner_first(const hsep_planner *self) { return hsep_planner_sp
 /* Rows of splines x, (m,), of this cost. */
 static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows[])
 {
-    hsep_real *c = hsep_planner_problem(self).c;
+    hsep_real *c = planner_problem(self).c;
     hsep_knots_widen(&self->solved, x, c);
     hsep_splines_rows(hsep_planner_splines(self), c, planner_first(self), rows);
-}
-
-HSEP_API void hsep_planner_may_turn(hsep_planner *self)
-{
-    hsep_zero(hsep_at(self, self->moves), hsep_planner_splines(self)->preview);
 }
 
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int n = self->solved.m;
-    const hsep_problem problem = hsep_planner_problem(self);
+    const hsep_problem problem = planner_problem(self);
     const hsep_real *third = hsep_at(self, self->third);
     hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0;
     hsep_splines_jerk(splines, jerk_weight, third, planner_first(self), problem.products, problem.c);
@@ -310,12 +309,11 @@ static void planner_pin(hsep_planner *self)
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_problem problem = hsep_planner_problem(self);
+    const hsep_problem problem = planner_problem(self);
     const hsep_real *b = hsep_splines_shape(splines);
     const hsep_int spacing = splines->spacing, width = 4 * spacing, first = self->n_pinned, n = splines->n - first;
     hsep_real *P = hsep_planner_quadratic(self), *delta = problem.low;
-    self->change = 1.0;
-    hsep_planner_open(self, x_d);
+    hsep_planner_open(self, x_d, 0, 1.0);
     self->solved = hsep_knots_of(n, 0);
     for (hsep_int k = 0; k < splines->preview; k++) {
         delta[k] = hsep_planner_delta(self, k);
@@ -345,47 +343,47 @@ static void planner_start(hsep_planner *self, hsep_real x[])
 
 /* Begin a bounded plan at this cost, from the remainder of the last plan. The pinned samples stay as they are, and its
  * bounds are what they leave. cost: as hsep_interior_begin has it. */
-static void planner_bound(hsep_planner *self, hsep_real cost, const hsep_tolerance *tolerance)
+static void planner_bound(hsep_planner *self, hsep_real cost, hsep_int steps)
 {
+    hsep_tolerance tolerance = planner_tolerance(self->averaging);
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int preview = splines->preview;
     const hsep_real *total = hsep_at(self, self->total);
-    const hsep_problem problem = hsep_planner_problem(self);
+    const hsep_real *least = hsep_at(self, self->low), *most = hsep_at(self, self->high);
+    const hsep_problem problem = planner_problem(self);
     hsep_real *low = problem.low, *high = problem.high;
     planner_start(self, problem.x);
     planner_rows(self, problem.x, low);
     for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
         const hsep_real other = total[r] - low[r];
-        hsep_real least, most;
-        planner_range(self, r, &least, &most);
-        low[r] = least - other + tolerance->margin;
-        high[r] = most - other - tolerance->margin;
+        low[r] = least[r] - other + tolerance.margin;
+        high[r] = most[r] - other - tolerance.margin;
     }
+    tolerance.steps = steps;
     hsep_interior_begin(
-        hsep_part(self, self->interior), splines, &self->solved, hsep_planner_quadratic(self), cost, tolerance);
+        hsep_part(self, self->interior), splines, &self->solved, hsep_planner_quadratic(self), cost, &tolerance);
 }
 
 /* Change the remainder of the last plan by a step x, (m,), m, of this cost. */
 static void planner_take(hsep_planner *self, const hsep_real x[])
 {
-    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self), *c = hsep_planner_problem(self).c;
+    hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self), *c = planner_problem(self).c;
     hsep_knots_widen(&self->solved, x, c);
     hsep_axpy(rest, 1.0, c, self->solved.n);
 }
 
-HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance)
+HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
 {
     const hsep_int n = self->solved.m;
     const hsep_real *row = hsep_planner_quadratic(self);
-    const hsep_problem problem = hsep_planner_problem(self);
+    const hsep_problem problem = planner_problem(self);
     hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low, *start = problem.high; /* work */
-    hsep_real *factor = hsep_at(self, self->factor);
-    hsep_copy(factor, row, (hsep_int)hsep_triangle(n));
-    if (!hsep_cholesky_rows(factor, n, 0, n, NULL)) {
+    hsep_copy(problem.factor, row, (hsep_int)hsep_triangle(n));
+    if (!hsep_cholesky_rows(problem.factor, n, 0, n, NULL)) {
         return HSEP_PLAN_FAILED;
     }
     hsep_copy(free_minimum, v, n);
-    hsep_cholesky_solve(factor, n, free_minimum);
+    hsep_cholesky_solve(problem.factor, n, free_minimum);
     planner_start(self, start);
     hsep_real cost = 0.0, finite = 0.0;
     for (hsep_int j = 0; j < n; j++) {
@@ -412,17 +410,17 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tole
     if (!self->changes) {
         planner_pin(self);
     }
-    planner_bound(self, cost, tolerance);
+    planner_bound(self, cost, steps);
     return HSEP_PLAN_BOUNDED;
 }
 
-HSEP_API int hsep_planner_advance(hsep_planner *self)
+HSEP_API hsep_plan_status hsep_planner_advance(hsep_planner *self)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     if (!hsep_interior_advance(hsep_part(self, self->interior), splines, hsep_planner_quadratic(self))) {
-        return 0;
+        return HSEP_PLAN_BOUNDED;
     }
-    const hsep_problem problem = hsep_planner_problem(self);
+    const hsep_problem problem = planner_problem(self);
     hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high, finite = 0.0;
     planner_start(self, at);
     for (hsep_int j = 0; j < self->solved.m; j++) {
@@ -438,10 +436,10 @@ HSEP_API int hsep_planner_advance(hsep_planner *self)
         way[j] = isfinite(finite) ? at[j] + share * way[j] : 0.0;
     }
     planner_take(self, way);
-    return 1;
+    return HSEP_PLAN_DONE;
 }
 
-/* Stop behind decided and shared coefficients, in place, (count,) m. */
+/* Stop after decided and shared coefficients, in place, (count,) m. */
 static void stop_behind(const hsep_stop *self, hsep_real c[])
 {
     const hsep_real *gains = hsep_at_const(self, self->gains);
@@ -470,16 +468,15 @@ static void stop_rows(const hsep_stop *self, const hsep_splines *splines, const 
     }
 }
 
-/* Bounds of the rows of a change: what limits and command leave, and the last stop at least. */
-static void stop_bounds(hsep_stop *self, const hsep_planner *planner, const hsep_real x_d[])
+/* Bounds of the rows of a change: what limits and command leave, and the last stop at least. total: work. */
+static void stop_bounds(hsep_stop *self, const hsep_planner *planner, const hsep_real x_d[], hsep_real total[])
 {
-    const hsep_real most = 1.0 - HSEP_QP_ROUNDING, *start = hsep_at(self, self->start);
+    const hsep_real *start = hsep_at(self, self->start);
     hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
-    planner_totals(planner, x_d, 0, self->preview, high, low);
+    planner_limits(planner, x_d, 0, self->preview, 1.0, total, low, high);
     for (hsep_int r = 0; r < HSEP_ORDERS * self->preview; r++) {
-        const hsep_real without = high[r], exceeded = low[r];
-        low[r] = hsep_fmin((hsep_fmin(exceeded, 0.0) - most) - without, start[r]) - HSEP_QP_ROUNDING;
-        high[r] = hsep_fmax((hsep_fmax(exceeded, 0.0) + most) - without, start[r]) + HSEP_QP_ROUNDING;
+        low[r] = hsep_fmin(low[r] - total[r], start[r]) - HSEP_LIMITS_ROUNDING;
+        high[r] = hsep_fmax(high[r] - total[r], start[r]) + HSEP_LIMITS_ROUNDING;
     }
 }
 
@@ -503,12 +500,6 @@ static hsep_real stop_share(const hsep_stop *self, hsep_real length)
     return least <= most ? hsep_fmin(hsep_fmax(0.0, least), most) : (hsep_real)NAN;
 }
 
-HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self)
-{
-    const hsep_stop *stop = hsep_part_const(self, self->stop);
-    return self->stop > 0 ? HSEP_STOP_WORK * (hsep_real)stop->preview : 0.0;
-}
-
 HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[])
 {
     if (planner->stop == 0) {
@@ -530,7 +521,7 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     hsep_copy(now, plan, first);
     stop_behind(self, now);
     stop_rows(self, splines, last, start);
-    stop_bounds(self, planner, x_d);
+    stop_bounds(self, planner, x_d, way);
     stop_rows(self, splines, own, own_rows);
     stop_rows(self, splines, now, way);
     for (hsep_int r = 0; r < rows; r++) {
@@ -553,7 +544,7 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[
     stop_behind(self, last);
     hsep_axpy(last, share, own, self->count);
     const hsep_int all = HSEP_N_DECIDED + splines->n, begin = first + self->shared;
-    for (hsep_int i = 0; i < all && length < 1.0; i++) { /* behind what the next plan shares of it the change fades */
+    for (hsep_int i = 0; i < all && length < 1.0; i++) { /* after what the next plan shares of it the change fades */
         const hsep_real gone = i > begin ? (hsep_real)(i - begin) / (hsep_real)(all - begin) : 0.0;
         const hsep_real left = 1.0 - gone * gone * gone;
         plan[i] = left * left * left * last[hsep_min(i, self->count - 1)];

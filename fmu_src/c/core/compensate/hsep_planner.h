@@ -9,7 +9,6 @@
 #ifndef HSEP_PLANNER_H
 #define HSEP_PLANNER_H
 
-#include "hsep_interior.h"
 #include "hsep_splines.h"
 #include "hsep_window.h"
 
@@ -17,20 +16,19 @@ typedef struct {
     hsep_int Np;
     hsep_int n_pinned; /* splines of a bounded plan that stay as they were */
     hsep_int no_reversal;
-    hsep_int changes; /* whether the cost is of a change of the last plan; otherwise it is of a plan */
+    hsep_int averaging; /* whether plans are of the averaged model, */
+    hsep_int steps;     /* and those of the solver at most */
+    hsep_int changes;   /* whether the cost is of a change of the last plan; otherwise it is of a plan */
     hsep_real jerk_weight;
-    hsep_real change;                         /* share of the limit of |delta| that bounds it */
     hsep_real delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
     hsep_int c;                               /* (3 + n,) m, coefficients */
-    hsep_int total;  /* (4 preview,) rows of x_dm under the remainder of the last plan, in shares */
-    hsep_int own;    /* (4 preview,) rows of x_d where one nearby exceeds its limit, else 0; order 0: 0 */
-    hsep_int moves;  /* (preview,) which way x_d moves: -1, 0, 1; 0 where that does not matter */
-    hsep_int third;  /* (preview,) m, third differences of what the cost begins with */
-    hsep_int P;      /* triangle of n rows */
-    hsep_int factor; /* triangle of n rows */
+    hsep_int total;     /* (4 preview,) rows of x_dm under the remainder of the last plan, in shares */
+    hsep_int low, high; /* (4 preview,) and their bounds */
+    hsep_int third;     /* (preview,) m, third differences of what the cost begins with */
+    hsep_int P;         /* triangle of n rows */
     hsep_int splines, interior;
     hsep_knots knots;  /* of changes of the last plan, */
-    hsep_knots solved; /* and those of this cost */
+    hsep_knots solved; /* and of this cost */
     hsep_int stop;     /* of plans that are longer than what is known; 0: none is */
 } hsep_planner;
 HSEP_ASSERT_WORDS(hsep_planner, 40);
@@ -39,12 +37,6 @@ HSEP_ASSERT_WORDS(hsep_planner, 40);
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
 {
     return hsep_part_const(self, self->splines);
-}
-
-/* Where its programme is; x: the change that was found last. */
-static inline hsep_problem hsep_planner_problem(hsep_planner *self)
-{
-    return hsep_interior_problem(hsep_part(self, self->interior), hsep_planner_splines(self));
 }
 
 /* Coefficients of the plan, (3 + n,), m; until it is made, of the remainder of the last plan. */
@@ -60,8 +52,7 @@ static inline hsep_real hsep_planner_delta(const hsep_planner *self, hsep_int k)
 typedef enum {
     HSEP_PLAN_FAILED = 0, /* no finite plan: the remainder of the last one is followed */
     HSEP_PLAN_DONE,
-    HSEP_PLAN_BOUNDED, /* hsep_planner_advance is to be called until it returns 1 */
-    HSEP_PLAN_OPEN     /* it is to be solved */
+    HSEP_PLAN_BOUNDED /* hsep_planner_advance is to be called until it returns another one */
 } hsep_plan_status;
 
 /* Knots that a change of the last plan is solved for: of the splines that a bounded plan does not leave as they are. */
@@ -77,42 +68,36 @@ static inline hsep_int hsep_planner_pinned(const hsep_planner *self)
     return self->n_pinned * hsep_planner_splines(self)->spacing;
 }
 
-/* Begin plans of a window. x_d: commanded positions, m, (preview,). The cost of the next one is 1/2 x' P x - v' x of a
+/* Begin a plan. x_d: commanded positions, m, (preview,); may_turn: whether it may turn where no_reversal forbids it;
+ * change: share of change_max that bounds it. The cost of the next one is 1/2 x' P x - v' x of a
  * change of the last one by the splines of the planner's knots, unless hsep_planner_aim or _end sets another one. The
  * caller sets the triangle P of m rows and v, (m,), m; hsep_planner_complete adds the jerk's, times a weight, to v, and
  * to P with what makes it positive definite. */
-HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[]);
+HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], int may_turn, hsep_real change);
 static inline hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
-static inline hsep_real *hsep_planner_linear(hsep_planner *self) { return hsep_planner_problem(self).v; }
+HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight);
 
-/* Let plans of this window turn where no_reversal forbids it. */
-HSEP_API void hsep_planner_may_turn(hsep_planner *self);
-
-/* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline behind it,
- * (preview,); target: x_d minus its response to x_d plus the decided part of delta, (preview,) m. Cost: n preview. */
+/* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline after it,
+ * (preview,); target: x_d minus its response to x_d plus the decided part of delta, (preview,) m. */
 HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
 
 /* Open a change of the last plan that ends compensation, with the cost of delta itself, and of its jerk, which makes it
- * as smooth as a short part of a plan allows. It ends where the last plan does. x_d: as hsep_planner_open has it. Cost:
- * 30 n spacing and 15 preview multiply-adds, and those of hsep_knots_add. */
+ * as smooth as a short part of a plan allows. It ends where the last plan does. x_d: as hsep_planner_open has it. */
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
 
 /* Plan at this cost, which is used up. The first samples (hsep_planner_pinned) stay as they are in a change of the last
- * plan, and in a bounded plan, which is solved within the tolerance. Cost: m^3 / 6 multiply-adds. */
-HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, const hsep_tolerance *tolerance);
+ * plan, and in a bounded plan, which is solved within the tolerance. */
+HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps);
 
-/* Do a part of a step of a bounded plan; return whether the plan is made. Cost: as hsep_interior_advance. */
-HSEP_API int hsep_planner_advance(hsep_planner *self);
+/* Do half a step of a bounded plan. */
+HSEP_API hsep_plan_status hsep_planner_advance(hsep_planner *self);
 
 /* Cost of the jerk of a plan, m2, work: (preview,). */
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[]);
 
 /* Shorten the plan, once it is made, to what keeps the limits whatever follows the known part of x_d, (preview,), m. */
 HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[]);
-
-/* What that costs, in multiply-adds; 0 where plans end with what is known. */
-HSEP_API hsep_real hsep_planner_carrying(const hsep_planner *self);
 
 /* Move on by a window with the commanded positions x_d, (Np,), m. */
 HSEP_API void hsep_planner_next(hsep_planner *self, const hsep_real x_d[]);

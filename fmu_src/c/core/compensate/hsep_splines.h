@@ -48,47 +48,6 @@ static inline hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing)
     return (preview - 4 * spacing - HSEP_SPLINES_END) / spacing + 1;
 }
 
-HSEP_API hsep_real hsep_splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int spacing);
-/* Fill the block. limit: of the change, m, and of its differences of orders 1 to 3, m a sample to that power. */
-HSEP_API void hsep_splines_init(
-    hsep_splines *self, hsep_int preview, hsep_int spacing, const hsep_real limit[HSEP_ORDERS]);
-
-/* Another limit of an order from now on, m a sample to that power. Cost: 10 spacing operations. */
-HSEP_API void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real limit);
-
-/* Sum of the first count splines at sample k, with coefficients c, (count,), from spline -3 on. 4 multiply-adds. */
-HSEP_API hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int k);
-
-/* The rows of the splines first ... n - 1 with coefficients c, (n - first,). Cost: 14 operations a sample. */
-HSEP_API void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real rows[]);
-
-/* Rows of orders 1 to 3 of x_d, (count,) m, where one within the length of a spline exceeds its limit, 0 elsewhere; 4
- * count rows. before: (3,) m, the commands before it. */
-HSEP_API void hsep_splines_exceeded(
-    const hsep_splines *self, const hsep_real x_d[], const hsep_real before[3], hsep_int count, hsep_real rows[]);
-
-/* g, (n - first,), += A' rows, A being the matrix of hsep_splines_rows. The rows are used up. Cost: 9 operations a
- * sample, and 4 preview multiply-adds. */
-HSEP_API void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[]);
-
-/* The products A' diag(weights) A (hsep_knots_add). work: (4 preview + 4 HSEP_LANES_MOST,), of which the last ones are
- * read beside others. Cost: 40 spacing multiply-adds for each of these splines. */
-HSEP_API void hsep_splines_gram(
-    const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real products[], hsep_real work[]);
-
-/* The sum of squares of a uniform spline's rows: the largest entry on the diagonal of A' A. */
-HSEP_API hsep_real hsep_splines_energy(const hsep_splines *self);
-
-/* The triangle of n rows := W' W of the splines behind a filter, W's columns being the filtered spline, (preview,),
- * each shifted by one spacing more. Each diagonal is a running sum: n preview / 2 multiply-adds. */
-HSEP_API void hsep_splines_filtered_gram(const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[]);
-
-/* The products weight D' D, and g, (n - first,), := -weight D' third, with the third differences D of the splines
- * first ... n - 1, m; third: (preview,) m. */
-HSEP_API void hsep_splines_jerk(
-    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real products[],
-    hsep_real g[]);
-
 /* The spline itself, b, (4 spacing,). */
 static inline const hsep_real *hsep_splines_shape(const hsep_splines *self) { return hsep_at_const(self, self->shape); }
 
@@ -116,20 +75,359 @@ typedef struct {
     const hsep_real *share;
 } hsep_knot;
 
-/* n uniform splines, of which so many begin in a window; 0: each is solved for. */
-HSEP_API hsep_knots hsep_knots_of(hsep_int n, hsep_int window);
+/* The differences of an order of one spline, in shares, (4 spacing + order,); the first one is 0. */
+static inline const hsep_real *splines_differences(const hsep_splines *self, unsigned order)
+{
+    return hsep_at_const(self, self->differences[order]);
+}
 
-HSEP_API hsep_knot hsep_knots_at(const hsep_knots *self, hsep_int i);
+static inline hsep_int splines_length(const hsep_splines *self, unsigned order) { return 4 * self->spacing + order; }
+
+static inline hsep_real hsep_splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int spacing)
+{
+    hsep_real end = HSEP_WORDS(hsep_splines);
+    self->preview = preview;
+    self->spacing = spacing;
+    self->n = hsep_splines_count(preview, spacing);
+    self->shape = hsep_take(&end, 4.0 * (hsep_real)spacing);
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        self->differences[order] = hsep_take(&end, 4.0 * (hsep_real)spacing + 3.0);
+    }
+    return end * sizeof(hsep_real);
+}
+
+/* Another limit of an order from now on, m a sample to that power. */
+static inline void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_real limit)
+{
+    const hsep_int width = 4 * self->spacing;
+    const hsep_real *b = hsep_splines_shape(self);
+    hsep_real *e = hsep_at(self, self->differences[order]), now[HSEP_ORDERS] = {0.0};
+    self->share[order] = 1.0 / limit;
+    for (hsep_int k = 0; k < width + 3; k++) {
+        hsep_differ(now, k < width ? b[k] : 0.0);
+        e[k] = now[order] * self->share[order];
+    }
+}
+
+/* Fill the block. limit: of the change, m, and of its differences of orders 1 to 3, m a sample to that power. */
+static inline void hsep_splines_init(
+    hsep_splines *self, hsep_int preview, hsep_int spacing, const hsep_real limit[HSEP_ORDERS])
+{
+    (void)hsep_splines_lay_out(self, preview, spacing);
+    for (hsep_int k = 0; k < 4 * spacing; k++) { /* the uniform cubic B-spline on the knots 0, 1, 2, 3, 4 */
+        const hsep_real at = (hsep_real)k / (hsep_real)spacing, u = at >= 2.0 ? 4.0 - at : at; /* it is symmetric */
+        hsep_at(self, self->shape)[k] = u < 1.0 ? u * u * u / 6.0 : (((-3.0 * u + 12.0) * u - 12.0) * u + 4.0) / 6.0;
+    }
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        hsep_splines_limit(self, order, limit[order]);
+    }
+}
+
+/* Sum of the first count splines at sample k, with coefficients c, (count,), from spline -3 on. */
+static inline hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int k)
+{
+    const hsep_real *b = hsep_splines_shape(self);
+    const hsep_int place = k / self->spacing, within = k % self->spacing;
+    hsep_real sum = 0.0;
+    for (hsep_int i = 0; i <= HSEP_N_DECIDED && place + i < count; i++) {
+        sum += c[place + i] * b[within + (HSEP_N_DECIDED - i) * self->spacing];
+    }
+    return sum;
+}
+
+/* delta, (preview,), of the splines first ... n - 1 with coefficients c, (n - first,). */
+static inline void splines_change(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real delta[])
+{
+    const hsep_real *b = hsep_splines_shape(self);
+    const hsep_int spacing = self->spacing, count = self->n - first;
+    hsep_int k = first * spacing;
+    hsep_zero(delta, k);
+    for (hsep_int place = 0; k < self->preview; place++) { /* between two knots */
+        for (hsep_int within = 0; within < spacing && k < self->preview; within++, k++) {
+            delta[k] = 0.0;
+            for (hsep_int i = place < count ? 0 : place - count + 1; i <= HSEP_N_DECIDED && i <= place; i++) {
+                delta[k] += c[place - i] * b[within + i * spacing];
+            }
+        }
+    }
+}
+
+/* The rows of the splines first ... n - 1 with coefficients c, (n - first,). */
+static inline void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real rows[])
+{
+    const hsep_int preview = self->preview;
+    splines_change(self, c, first, rows);
+    for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+        const hsep_real *of = rows + (order - 1) * preview;
+        hsep_copy(rows + order * preview, of, preview);
+        hsep_axpy(rows + order * preview + 1, -1.0, of, preview - 1);
+    }
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        for (hsep_int k = 0; k < preview; k++) {
+            rows[order * preview + k] *= self->share[order];
+        }
+    }
+}
+
+/* Rows of orders 1 to 3 of x_d, (count,) m, where one within the length of a spline exceeds its limit, 0 elsewhere; 4
+ * count rows. before: (3,) m, the commands before it. */
+static inline void hsep_splines_exceeded(
+    const hsep_splines *self, const hsep_real x_d[], const hsep_real before[3], hsep_int count, hsep_real rows[])
+{
+    const hsep_int near = 4 * self->spacing;
+    hsep_real now[HSEP_ORDERS];
+    hsep_zero(rows, count);
+    hsep_differ_from(now, before);
+    for (hsep_int k = 0; k < count; k++) {
+        hsep_differ(now, x_d[k]);
+        for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+            rows[order * count + k] = now[order] * self->share[order];
+        }
+    }
+    for (unsigned order = 1; order < HSEP_ORDERS; order++) {
+        hsep_real *row = rows + order * count;
+        hsep_int done = 0;
+        for (hsep_int k = 0; k < count; k++) {
+            if (hsep_fabs(row[k]) > HSEP_LIMITS_EXCEEDED) {
+                for (; done + near < k; done++) {
+                    row[done] = 0.0;
+                }
+                done = k + near + 1;
+            }
+        }
+        for (; done < count; done++) {
+            row[done] = 0.0;
+        }
+    }
+}
+
+/* g, (n - first,), += A' rows, A being the matrix of hsep_splines_rows. The rows are used up. */
+static inline void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[])
+{
+    const hsep_real *b = hsep_splines_shape(self);
+    const hsep_int preview = self->preview, spacing = self->spacing;
+    const hsep_real s0 = self->share[0], s1 = self->share[1], s2 = self->share[2], s3 = self->share[3];
+    const hsep_real *r1 = rows + preview, *r2 = rows + 2 * preview, *r3 = rows + 3 * preview;
+    /* A' = B' (s_0 + D' (s_1 + D' (s_2 + D' s_3))) with the differences D: what later samples say comes first. */
+    const hsep_int begin = first * spacing + 1, end = self->n * spacing + 3 * spacing; /* of the change itself */
+    const hsep_real a3 = s3 * r3[end + 2], b3 = s3 * r3[end + 1], a2 = s2 * r2[end + 1] + (b3 - a3);
+    hsep_real u3 = s3 * r3[end], u2 = s2 * r2[end] + (u3 - b3), u1 = s1 * r1[end] + (u2 - a2);
+    for (hsep_int k = end; k-- > begin;) {
+        const hsep_real v3 = s3 * r3[k], v2 = s2 * r2[k] + (v3 - u3), v1 = s1 * r1[k] + (v2 - u2);
+        rows[k] = s0 * rows[k] + (v1 - u1);
+        u1 = v1, u2 = v2, u3 = v3;
+    }
+    for (hsep_int j = first; j < self->n; j++) {
+        g[j - first] += hsep_dot(b + 1, rows + j * spacing + 1, 4 * spacing - 1);
+    }
+}
+
+/* sums, (HSEP_SPLINES_TOGETHER,): products of splines i, i + 1, ..., each with the one d later; of sorted weights. */
+static inline void splines_products(
+    const hsep_splines *self, const hsep_real sorted[], hsep_int i, hsep_int d, hsep_real sums[])
+{
+    const hsep_int spacing = self->spacing;
+    hsep_lanes s0 = {0.0}, s1 = s0, s2 = s0, s3 = s0; /* each has a name, and so a register */
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        const hsep_real *e = splines_differences(self, order);
+        const hsep_int length = splines_length(self, order);
+        hsep_int begin = order * self->preview; /* of a phase */
+        for (hsep_int phase = 0; phase < spacing; phase++) {
+            const hsep_real *weight = sorted + begin + i;
+            for (hsep_int k = phase; k < length; k += spacing, weight++) {
+                if (k > d * spacing) {
+                    const hsep_real product = e[k] * e[k - d * spacing];
+                    const hsep_lanes *w = hsep_lanes_const(weight);
+                    s0 += product * w[0], s1 += product * w[1], s2 += product * w[2], s3 += product * w[3];
+                }
+            }
+            begin += (self->preview - phase - 1) / spacing + 1;
+        }
+    }
+    hsep_lanes *to = hsep_lanes_at(sums);
+    to[0] = s0, to[1] = s1, to[2] = s2, to[3] = s3;
+}
+
+/* Set the product of spline i with i + d. */
+static inline void splines_product(hsep_real products[], hsep_int i, hsep_int d, hsep_real value)
+{
+    products[HSEP_KNOTS_WIDTH * i + HSEP_KNOTS_NEAR + d] = value;
+    products[HSEP_KNOTS_WIDTH * (i + d) + HSEP_KNOTS_NEAR - d] = value;
+}
+
+/* The products A' diag(weights) A (hsep_knots_add). work: (4 preview + 4 HSEP_LANES_MOST,), of which the last ones are
+ * read beside others. */
+static inline void hsep_splines_gram(
+    const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real products[], hsep_real work[])
+{
+    const hsep_int n = self->n - first;
+    hsep_real sums[HSEP_SPLINES_TOGETHER], *sorted = work; /* rows that are spacing apart become neighbours */
+    for (unsigned order = 0; order < HSEP_ORDERS; order++, weights += self->preview) {
+        for (hsep_int phase = 0; phase < self->spacing; phase++) {
+            for (hsep_int k = phase; k < self->preview; k += self->spacing) {
+                *sorted++ = weights[k];
+            }
+        }
+    }
+    hsep_zero(products, HSEP_KNOTS_WIDTH * n);
+    for (hsep_int d = 0; d < n && d * self->spacing + 1 < splines_length(self, HSEP_ORDERS - 1); d++) {
+        for (hsep_int i = 0; i + d < n; i++) {
+            const hsep_int within = i % HSEP_SPLINES_TOGETHER;
+            if (within == 0) {
+                splines_products(self, work, first + i, d, sums);
+            }
+            splines_product(products, i, d, sums[within]);
+        }
+    }
+}
+
+/* The sum of squares of a uniform spline's rows: the largest entry on the diagonal of A' A. */
+static inline hsep_real hsep_splines_energy(const hsep_splines *self)
+{
+    hsep_real sum = 0.0;
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        const hsep_real *e = splines_differences(self, order);
+        sum += hsep_dot(e, e, splines_length(self, order));
+    }
+    return sum;
+}
+
+/* The triangle of n rows := W' W of the splines behind a filter, W's columns being the filtered spline, (preview,),
+ * each shifted by one spacing more. Each diagonal is a running sum. */
+static inline void hsep_splines_filtered_gram(
+    const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[])
+{
+    const hsep_int n = self->n, spacing = self->spacing;
+    for (hsep_int d = 0; d < n; d++) {
+        /* Columns j - d and j: sum over u of s(u + d spacing) s(u), up to where column j is cut off */
+        hsep_real sum = 0.0;
+        hsep_int u = 0;
+        for (hsep_int j = n; j-- > d;) { /* rows 0 ... i - 1 have n, n - 1, ... entries */
+            for (; u + j * spacing < self->preview; u++) {
+                sum += filtered[u + d * spacing] * filtered[u];
+            }
+            const hsep_int i = j - d;
+            triangle[i * n - i * (i - 1) / 2 + d] = sum;
+        }
+    }
+}
+
+/* The products weight D' D, and g, (n - first,), := -weight D' third, with the third differences D of the splines
+ * first ... n - 1, m; third: (preview,) m. */
+static inline void hsep_splines_jerk(
+    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real products[],
+    hsep_real g[])
+{
+    const hsep_real *e = splines_differences(self, 3);
+    const hsep_int n = self->n - first, length = splines_length(self, 3);
+    const hsep_real unit = 1.0 / self->share[3], of_third = weight / self->share[3];
+    hsep_zero(products, HSEP_KNOTS_WIDTH * n);
+    for (hsep_int d = 0; d < n && d * self->spacing + 1 < length; d++) {
+        hsep_real sum = 0.0;
+        for (hsep_int k = d * self->spacing + 1; k < length; k++) {
+            sum += (e[k] * unit) * (e[k - d * self->spacing] * unit);
+        }
+        for (hsep_int i = 0; i + d < n; i++) {
+            splines_product(products, i, d, weight * sum);
+        }
+    }
+    for (hsep_int j = first; j < self->n; j++) {
+        g[j - first] = -(of_third * hsep_dot(e + 1, third + j * self->spacing + 1, length - 1));
+    }
+}
+
+/* Cubic splines with knots 1, 2 and 4 spacings apart as sums of those 1 apart: the two-scale relation. */
+static const hsep_real knots_shares[] = {1.0,      0.125,   0.5,     0.75,     0.5,     0.125,  0.015625,
+                                         0.0625,   0.15625, 0.3125,  0.484375, 0.625,   0.6875, 0.625,
+                                         0.484375, 0.3125,  0.15625, 0.0625,   0.015625};
+static const hsep_int knots_places[HSEP_KNOTS_LEVELS] = {0, 1, 6};
+static inline hsep_int knots_length(int level) { return ((hsep_int)4 << level) - 3; }
+
+static inline hsep_knot hsep_knots_at(const hsep_knots *self, hsep_int i)
+{
+    int level = 0;
+    hsep_int end = self->count[0];
+    while (i >= end) {
+        end += self->count[++level];
+    }
+    return (hsep_knot){
+        .level = (hsep_int)level,
+        .first = end - self->count[level],
+        .last = end - 1,
+        .begin = self->begin[level] + ((i + self->count[level] - end) << level),
+        .length = knots_length(level),
+        .share = knots_shares + knots_places[level]};
+}
+
+/* n uniform splines, of which so many begin in a window; 0: each is solved for. */
+static inline hsep_knots hsep_knots_of(hsep_int n, hsep_int window)
+{
+    const hsep_int wide = window > 4 ? window : 4;
+    hsep_knots knots = {.n = n, .count = {n}};
+    hsep_int begin = 0;
+    for (int level = 0; window > 0 && level < HSEP_KNOTS_LEVELS; level++) {
+        const hsep_int apart = (hsep_int)1 << level, end = level < HSEP_KNOTS_LEVELS - 1 ? 2 * apart * wide : n;
+        knots.begin[level] = begin;
+        for (; begin < end && begin + knots_length(level) <= n; begin += apart) {}
+        knots.count[level] = (begin - knots.begin[level]) / apart;
+        begin -= 4 * apart; /* the next ones overlap */
+    }
+    knots.m = knots.count[0] + knots.count[1] + knots.count[2];
+    const hsep_knot last = hsep_knots_at(&knots, knots.m - 1);
+    knots.end = last.begin + last.length;
+    return knots;
+}
 
 /* c, (n,), of the uniform splines := x, (m,). */
-HSEP_API void hsep_knots_widen(const hsep_knots *self, const hsep_real x[], hsep_real c[]);
+static inline void hsep_knots_widen(const hsep_knots *self, const hsep_real x[], hsep_real c[])
+{
+    hsep_zero(c, self->n);
+    for (hsep_int i = 0; i < self->m; i++) {
+        const hsep_knot knot = hsep_knots_at(self, i);
+        for (hsep_int j = 0; j < knot.length; j++) {
+            c[knot.begin + j] += x[i] * knot.share[j];
+        }
+    }
+}
 
 /* h, (m,), += the transpose of hsep_knots_widen of g, (n,). */
-HSEP_API void hsep_knots_narrow(const hsep_knots *self, const hsep_real g[], hsep_real h[]);
+static inline void hsep_knots_narrow(const hsep_knots *self, const hsep_real g[], hsep_real h[])
+{
+    for (hsep_int i = 0; i < self->m; i++) {
+        const hsep_knot knot = hsep_knots_at(self, i);
+        hsep_real sum = 0.0;
+        for (hsep_int j = 0; j < knot.length; j++) {
+            sum += knot.share[j] * g[knot.begin + j];
+        }
+        h[i] += sum;
+    }
+}
 
 /* The triangle of m rows += a symmetric product of the uniform splines, products[HSEP_KNOTS_WIDTH i + HSEP_KNOTS_NEAR +
- * d] of spline i with i + d. work: (n + 2 HSEP_KNOTS_NEAR,). Cost: about 300 multiply-adds for each spline. */
-HSEP_API void hsep_knots_add(
-    const hsep_knots *self, const hsep_real products[], hsep_real triangle[], hsep_real work[]);
+ * d] of spline i with i + d. work: (n + 2 HSEP_KNOTS_NEAR,). */
+static inline void hsep_knots_add(
+    const hsep_knots *self, const hsep_real products[], hsep_real triangle[], hsep_real work[])
+{
+    hsep_zero(work, self->n + 2 * HSEP_KNOTS_NEAR);
+    for (hsep_int i = 0; i < self->m; i++) {
+        const hsep_knot row = hsep_knots_at(self, i);
+        const hsep_int after = row.begin + row.length + HSEP_KNOTS_NEAR;
+        for (hsep_int k = 0; k < row.length; k++) { /* products of this spline with uniform ones */
+            const hsep_real *of_uniform = products + HSEP_KNOTS_WIDTH * (row.begin + k);
+            hsep_axpy(work + row.begin + k, row.share[k], of_uniform, HSEP_KNOTS_WIDTH);
+        }
+        for (hsep_int j = i; j < self->m; j++) {
+            const hsep_knot column = hsep_knots_at(self, j);
+            if (column.begin < after) {
+                const hsep_real *of_column = work + HSEP_KNOTS_NEAR + column.begin;
+                triangle[j - i] += hsep_dot(column.share, of_column, column.length);
+            } else {
+                j = column.last;
+            }
+        }
+        hsep_zero(work + row.begin, row.length + 2 * HSEP_KNOTS_NEAR);
+        triangle += self->m - i;
+    }
+}
 
 #endif

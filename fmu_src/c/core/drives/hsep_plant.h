@@ -69,7 +69,7 @@ typedef struct {
     uint64_t n_line, oldest; /* commands on their way through the dead time; place of the oldest */
     uint64_t modes;          /* hsep_stage_mode[n_modes] */
     uint64_t z;              /* (2 n_modes,) z and z' of each, m s^2 and m s */
-    uint64_t line;           /* (n_line,) m from start; behind it lies the work space of a step */
+    uint64_t line;           /* (n_line,) m from start; after it lies the work space of a step */
 } hsep_stage;
 
 HSEP_ASSERT_WORDS(hsep_feed_drive, 9);

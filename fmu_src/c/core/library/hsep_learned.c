@@ -139,7 +139,7 @@ static hsep_learned_setting learned_setting(uint64_t mode, const char *name, dou
 enum { LEARNED_OWN = 0 HSEP_PREDICTOR_SETTINGS(COUNT) HSEP_AVERAGING_SETTINGS(COUNT) };
 #undef COUNT
 
-/* Write the settings that weights depend on: the predictor's own with mode = 0, or those of a mode; return how many. */
+/* Write the settings that weights depend on: the predictor's own with mode = 0, or a mode's; return how many. */
 static uint64_t learned_settings(const hsep_parameters *parameters, uint64_t mode, hsep_learned_setting to[LEARNED_OWN])
 {
     uint64_t n = 0;

@@ -105,7 +105,7 @@ HSEP_API hsep_predictor_parameters hsep_compensator_derive(const hsep_parameters
     const hsep_int Np = parameters->predictor.Np, preview = settings->preview;
     const hsep_real T_s = parameters->predictor.T_s, t_init = parameters_t_init(parameters);
     hsep_predictor_parameters derived = hsep_predictor_derive(parameters);
-    /* Behind the window, and what the next one leaves as it is, a stop has to fit into the preview. */
+    /* After the window, and what the next one leaves as it is, a stop has to fit into the preview. */
     const int fits = preview >= Np + Np / 2 + 5 * settings->spacing + HSEP_SPLINES_END;
     derived.preview = preview;
     derived.horizon = fits && settings->horizon > preview ? settings->horizon : preview;

@@ -67,7 +67,7 @@
     SETTING(compensator, hsep_int, compensate, 2.0, 0.0, 2.0, 0.0, 0.0, 0) \
     /* time without a measurement after which the command's change fades; 0: never, s */ \
     SETTING(compensator, hsep_real, measurement_timeout, 1.0, 0.0, 10000.0, 1e-05, 0.0, 0) \
-    /* samples of a plan: behind the preview the command is taken to go on at its last velocity */ \
+    /* samples of a plan: after the preview the command is taken to go on at its last velocity */ \
     SETTING(compensator, hsep_int, horizon, 0.0, 0.0, 2000.0, 0.0, 0.0, 0)
 
 #define HSEP_MODE_SETTINGS(SETTING) \

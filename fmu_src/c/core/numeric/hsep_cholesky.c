@@ -49,7 +49,7 @@ HSEP_API int hsep_cholesky_rows(
     for (hsep_int k = first; k < last; k += HSEP_CHOLESKY_PANEL) {
         const hsep_int length = n - k, count = hsep_min(last - k, HSEP_CHOLESKY_PANEL);
         hsep_real *rows[HSEP_CHOLESKY_PANEL], a[HSEP_CHOLESKY_PANEL];
-        const hsep_real *x[HSEP_CHOLESKY_PANEL]; /* what they have in the column of a row below, and behind it */
+        const hsep_real *x[HSEP_CHOLESKY_PANEL]; /* what they have in the column of a row below, and after it */
         for (hsep_int r = 0; r < count; r++) {
             rows[r] = row;
             x[r] = row + (count - r);
@@ -177,7 +177,7 @@ HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_int n, hsep
     const hsep_real *row = triangle;
     for (hsep_int first = 0; first < count; first += HSEP_CHOLESKY_PANEL) {
         const hsep_int height = hsep_min(count - first, HSEP_CHOLESKY_PANEL), upper = hsep_min(height, 4);
-        const hsep_int behind = n - first - height;
+        const hsep_int after = n - first - height;
         const hsep_real *rows[HSEP_CHOLESKY_PANEL], *x[HSEP_CHOLESKY_PANEL];
         hsep_real *y = b + first;
         for (hsep_int r = 0; r < height; r++) {
@@ -192,11 +192,11 @@ HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_int n, hsep
             cholesky_forward_rows(rows + 4, height - 4, y + 4);
         }
         if (height == HSEP_CHOLESKY_PANEL) {
-            hsep_take_eight(y + height, y, x, behind);
+            hsep_take_eight(y + height, y, x, after);
             continue;
         }
         for (hsep_int r = 0; r < height; r++) {
-            hsep_axpy(y + height, -y[r], x[r], behind);
+            hsep_axpy(y + height, -y[r], x[r], after);
         }
     }
 }

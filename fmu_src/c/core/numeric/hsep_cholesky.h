@@ -13,7 +13,7 @@
 /* Doubles of a triangle of n rows. */
 static inline hsep_real hsep_triangle(hsep_int n) { return 0.5 * (hsep_real)n * ((hsep_real)n + 1.0); }
 
-/* Turn the rows first ... last - 1 of the upper triangle of P into those of R, in place, behind others that are
+/* Turn the rows first ... last - 1 of the upper triangle of P into those of R, in place, after others that are
  * finished; what they leave is subtracted from the rows below. Returns 0 if P is not positive definite or not finite;
  * the triangle is used up then. least: (n,) > 0, what each pivot is known to exceed, where rounding may hide it; NULL:
  * nothing is. Cost: n^3 / 6 multiply-adds for all rows. */
@@ -27,7 +27,7 @@ HSEP_API void hsep_cholesky_take_one(hsep_real triangle[], hsep_int n, hsep_int 
 HSEP_API void hsep_cholesky_take_four(hsep_real triangle[], hsep_int n, hsep_int head, hsep_real x[]);
 
 /* Turn the first count of b, (n,), into the solution y of R' y = b by the first count rows, and subtract from those
- * behind them what these rows leave of them. Cost: count (n - count / 2) multiply-adds. */
+ * after them what these rows leave of them. Cost: count (n - count / 2) multiply-adds. */
 HSEP_API void hsep_cholesky_forward(const hsep_real triangle[], hsep_int n, hsep_int count, hsep_real b[]);
 
 /* Turn b, (count,), into the solution x of R x = b by the first count rows and columns. Cost: count^2 / 2. */

@@ -7,7 +7,7 @@
  * only, which HSEP_ASSERT_WORDS proves: no byte of a state is padding.
  *
  * hsep_NAME_lay_out sets what follows from the parameters and returns the bytes of the block, counted as a number so
- * that no size can overflow: of a struct alone, too, which asks for the size only; where others need that alone, it is
+ * that no size can overflow: of a mere struct, too, which asks for the size only; where others need only that, it is
  * hsep_NAME_size. hsep_NAME_init fills a block with nothing learned. All functions of a block are reentrant and
  * allocate nothing. What a block needs comes with this header: linkage of its functions, numbers, libm and vectors.
  */

@@ -28,7 +28,7 @@ HSEP_API void hsep_regression_init(hsep_regression *self, hsep_int n, hsep_real 
 
 HSEP_API hsep_real *hsep_regression_row(hsep_regression *self) { return hsep_at(self, self->row); }
 
-/* Rotate n entries x of the row with those of a row of U:  x := x - pivot u,  u := u + gain x, whose rounding error is
+/* Rotate n entries x of the row with a row of U's:  x := x - pivot u,  u := u + gain x, whose rounding error is
  * kept in carry and added back next time (Kahan 1965). */
 static void regression_rotate(
     hsep_real *restrict u, hsep_real *restrict carry, hsep_real *restrict x, hsep_int n, hsep_real pivot,
@@ -85,7 +85,7 @@ HSEP_API void hsep_regression_fold(hsep_regression *self)
 HSEP_API void hsep_regression_solve(const hsep_regression *self, hsep_real w[])
 {
     const hsep_int n = self->n;
-    const hsep_real *u = hsep_at_const(self, self->carries); /* behind the last row */
+    const hsep_real *u = hsep_at_const(self, self->carries); /* after the last row */
     /* U w = z from the last row to the first: by fours from the next multiple of 4 on, then the others one by one. */
     for (hsep_int i = n; i-- > 0;) {
         const hsep_int fours = i - i % 4 + 4, rest = fours > n ? n : n - n % 4;

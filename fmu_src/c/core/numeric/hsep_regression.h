@@ -18,7 +18,7 @@ typedef struct {
     hsep_real n_rows;   /* rows so far */
     hsep_int inverse_d; /* (n,) 1/D */
     hsep_int row;       /* (n + 1,) the row that comes next */
-    hsep_int factor;    /* (n (n + 1) / 2,) U and z, by rows, from behind the diagonal on */
+    hsep_int factor;    /* (n (n + 1) / 2,) U and z, by rows, from after the diagonal on */
     hsep_int carries;   /* (n (n + 1) / 2,) what rounding took from them */
 } hsep_regression;
 HSEP_ASSERT_WORDS(hsep_regression, 6);

@@ -87,7 +87,7 @@ HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep
     self->waiting++;
 }
 
-/* Multiply-adds of a row that is taken in where so many rows of the head are factored. */
+/* Multiply-adds of a row that is taken in where this many rows of the head are factored. */
 static hsep_real solution_of_row(const hsep_solution *self, hsep_int factored)
 {
     const hsep_real all = (hsep_real)(self->n_head + self->n_tail + 1), left = all - (hsep_real)factored;
@@ -97,9 +97,9 @@ static hsep_real solution_of_row(const hsep_solution *self, hsep_int factored)
 HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come)
 {
     const hsep_real all = (hsep_real)(self->n_head + self->n_tail + 1 - self->factored);
-    const hsep_real behind = (hsep_real)self->n_tail + 1.0;
+    const hsep_real after = (hsep_real)self->n_tail + 1.0;
     const hsep_real rows = (hsep_real)(self->waiting + to_come);
-    return (all * all * all - behind * behind * behind) / 6.0 + rows * solution_of_row(self, self->n_head);
+    return (all * all * all - after * after * after) / 6.0 + rows * solution_of_row(self, self->n_head);
 }
 
 HSEP_API hsep_real hsep_solution_advance(hsep_solution *self, hsep_real amount, int all)

@@ -57,15 +57,15 @@ HSEP_API void hsep_solution_init(hsep_solution *self, hsep_int n_head, hsep_int 
 /* Give up the rows and the factor so far; the next solution has not begun. */
 HSEP_API void hsep_solution_reset(hsep_solution *self);
 
-/* Begin with the rows of a Gram matrix so far, and those of other, weighed by weight, which is settled, or NULL. Its
- * last n_head + n_tail features count. Penalties of the head, >= 0, are in the block, behind those of the tail. Rows
+/* Begin with the rows of a Gram matrix so far, and other's, weighed by weight, which is settled, or NULL. Its
+ * last n_head + n_tail features count. Penalties of the head, >= 0, are in the block, after the tail's. Rows
  * that wait in the Gram matrix wait here, too. */
 HSEP_API void hsep_solution_begin(hsep_solution *self, const hsep_gram *gram, const hsep_gram *other, hsep_real weight);
 
-/* Take another row of n features and its target, as the Gram matrix has them; the rows behind room are not taken. */
+/* Take another row of n features and its target, as the Gram matrix has them; the rows after room are not taken. */
 HSEP_API void hsep_solution_row(hsep_solution *self, const hsep_real row[], hsep_int n);
 
-/* Multiply-adds at most until the head is factored and has taken in the rows that wait, and so many to come. */
+/* Multiply-adds at most until the head is factored and has taken in the rows that wait, and the ones to come. */
 HSEP_API hsep_real hsep_solution_left(const hsep_solution *self, hsep_int to_come);
 
 /* Take in four rows that wait, or factor some of the head, until an amount of multiply-adds is spent, and return what

@@ -145,7 +145,7 @@ static inline hsep_int hsep_place_of_least(const hsep_real a[], hsep_int n, hsep
     return place;
 }
 
-/* What is left of y behind sum_r a_r x_r over four arrays x_r, one after the other: of numbers or vectors at j. */
+/* What is left of y after sum_r a_r x_r over four arrays x_r, one after the other: of numbers or vectors at j. */
 #define HSEP_TAKE(y, a0, x0, a1, x1, a2, x2, a3, x3, at, j) \
     (((((y) - (a0) * *at((x0) + (j))) - (a1) * *at((x1) + (j))) - (a2) * *at((x2) + (j))) - (a3) * *at((x3) + (j)))
 #define HSEP_NUMBER(a) (a)

@@ -30,7 +30,7 @@ typedef struct {
     int64_t n_latched; /* instants whose inputs are read in it, one after the other */
     double first;      /* s, from the step's start to the first of them */
     int inside;        /* whether one of them is no communication point */
-    double moved;      /* s, by which the last instant lay before the step's end, where it was taken; < 0: behind it */
+    double moved;      /* s, by which the last instant lay before the step's end, where it was taken; < 0: after it */
     int noticed;       /* whether that is more than rounding of times */
 } hsep_clock_step;
 

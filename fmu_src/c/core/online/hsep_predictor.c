@@ -6,7 +6,7 @@ static hsep_int predictor_take(hsep_real *end, hsep_real late, hsep_real count)
     return hsep_take(end, late + count) + (hsep_int)late;
 }
 
-/* Parts in which the averaged model predicts a window behind its first sample, as variances are dear. */
+/* Parts in which the averaged model predicts a window after its first sample, as variances are dear. */
 static const hsep_int predictor_parts = 25;
 
 HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters)
@@ -250,7 +250,7 @@ HSEP_API void hsep_predictor_predict(hsep_predictor *self, hsep_int first, hsep_
     }
 }
 
-/* Samples to predict next, of those behind the published ones. */
+/* Samples to predict next, after the published ones. */
 static hsep_int predictor_part(hsep_predictor *self)
 {
     const hsep_int part = (self->Np - 1) / predictor_parts + 1;
@@ -288,7 +288,7 @@ HSEP_API int hsep_predictor_sample(hsep_predictor *self, hsep_real x_d_ahead, hs
         hsep_zero(hsep_at(self, self->past_e), self->n + self->p);
     }
     hsep_predictor_begin(self);
-    /* Commands and x_pb as they came, eq. (2), behind the late samples' values */
+    /* Commands and x_pb as they came, eq. (2), after the late samples' values */
     hsep_real *command = hsep_at(self, self->command), *past_x = hsep_at(self, self->past_x);
     for (hsep_int i = 0; i < Np; i++) {
         command[Np - 1 - i] = hsep_at(self, self->x_d)[i] - self->start;

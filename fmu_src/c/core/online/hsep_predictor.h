@@ -5,7 +5,7 @@
  * measurements are late, the late samples before a window, which are not measured yet, are predicted with it: n = Np +
  * late samples. The first Np of these are learned when the window ends.
  *
- * Alone (hsep_predictor_sample, preview = Np) it predicts under the commands as they came. A compensator, which decides
+ * hsep_predictor_sample, preview = Np, predicts under the commands as they came. A compensator, which decides
  * the commands of a window, calls the parts in this order: hsep_predictor_take_in at each sample; at the end of a
  * window hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
  *
@@ -41,7 +41,7 @@ struct hsep_predictor {
     hsep_int n_measured;            /* samples since t_init */
     hsep_real sum_e, sum_pb, sum_h; /* m2, sums of squared servo and prediction errors over them */
     hsep_real sum_hold;             /* m2, the same if the last residual measured before each window were held */
-    hsep_real residual;  /* m, of the last sample measured, as published; 0 before any behind the first fill */
+    hsep_real residual;  /* m, of the last sample measured, as published; 0 before any after the first fill */
     hsep_real held;      /* m, that before the window */
     hsep_int early;      /* whether measurements come a sample early */
     hsep_real next;      /* m, then the measurement of the next sample; NaN if it is missing */
@@ -51,18 +51,18 @@ struct hsep_predictor {
     hsep_int x_pb;       /* (Np,) m, the window: physics-based predictions, */
     hsep_int x_h;        /* (Np,) m, hybrid predictions, */
     hsep_int x_hold;     /* (Np,) m, and held added to x_pb; before all four the last samples not measured yet */
-    hsep_int ahead_pb;   /* (Np,) m, response of the physics model to ahead, relative to start; alone */
+    hsep_int ahead_pb;   /* (Np,) m, response of the physics model to ahead, relative to start; without a compensator */
     hsep_int command;    /* (n,) m, commands of the window relative to start, newest first */
     hsep_int past_x;     /* (n + q,) m, x_pb of this window and of the q samples before it, newest first */
     hsep_int past_e;     /* (n + p,) m, e_pb likewise, as measured */
-    hsep_int e_h;        /* (n + p,) m, e_pb as predicted, behind it the measured ones; alone it is past_e */
+    hsep_int e_h;        /* (n + p,) m, e_pb as predicted, after it the measured ones; without a compensator past_e */
     hsep_int physics, uncertainty;
     hsep_int paper, averaged; /* the model of the residual e_pb = x - x_pb; the other one is 0 */
-    hsep_int motion;          /* the motion before the run; with averaging, alone */
+    hsep_int motion;          /* the motion before the run; with averaging and no compensator */
 };
 HSEP_ASSERT_WORDS(hsep_predictor, 37);
 
-/* Parameters that follow from those of the library; the modes are not copied. */
+/* Parameters that follow from the library's; the modes are not copied. */
 HSEP_API hsep_predictor_parameters hsep_predictor_derive(const hsep_parameters *parameters);
 HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predictor_parameters *parameters);
 /* Fill the block for a drive at rest at start, m. */
@@ -87,7 +87,7 @@ static inline hsep_uncertainty *hsep_predictor_uncertainty(hsep_predictor *self)
 /* Process sample k: learn it if it is sound, update the error sums, advance to k + 1; return whether a window ended. */
 HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas, int is_sound);
 
-/* Predict at once what is left of the window, alone; later samples are the same. */
+/* Predict at once what is left of the window, without a compensator; later samples are the same. */
 HSEP_API void hsep_predictor_complete(hsep_predictor *self);
 
 /* Finish a window: learn it with averaging, and its errors; its residuals become the past of the next one. */
@@ -105,7 +105,7 @@ HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_int last);
 /* Predict the errors of samples first ... last - 1 of the n, hsep_predictor_std, which were published. */
 HSEP_API void hsep_predictor_predict_std(hsep_predictor *self, hsep_int first, hsep_int last);
 
-/* Leading samples in the warm-up, of the window and so many late ones before it. */
+/* Leading samples in the warm-up, of the window and the late ones before it. */
 HSEP_API hsep_int hsep_predictor_warm_up(const hsep_predictor *self, hsep_int late);
 
 #endif

@@ -67,7 +67,7 @@ static inline void hsep_paper_learn(hsep_paper *self, const hsep_real x[], const
     hsep_regression_fold(hsep_paper_regression(self));
 }
 
-/* Run over the samples first ... last - 1 of n. x: (n + q,), e: (n + p,), m; both hold the past behind the window.
+/* Run over the samples first ... last - 1 of n. x: (n + q,), e: (n + p,), m; both hold the past after the window.
  * Cost: p + q + 1 multiply-adds a sample. */
 static inline void hsep_recursion_run(
     const hsep_recursion *self, const hsep_real x[], hsep_real e[], hsep_int n, hsep_int first, hsep_int last)

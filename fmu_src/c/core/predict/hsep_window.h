@@ -1,7 +1,7 @@
 /* Parameters of a predictor or compensator, and signals of a window whose residual a model predicts, and learns from.
  *
  * Signals are kept newest first: of the n samples that are predicted, late ones and a window or a preview, sample k is
- * at place n - 1 - k, and what was before them is behind them; the first Np are measured when the window ends. */
+ * at place n - 1 - k, and what was before them is after them; the first Np are measured when the window ends. */
 #ifndef HSEP_WINDOW_H
 #define HSEP_WINDOW_H
 
@@ -10,9 +10,9 @@
 typedef struct {
     hsep_predictor_settings settings;
     hsep_averaging_settings averaging;
-    hsep_compensator_settings compensator; /* of no meaning alone */
-    hsep_int preview;                      /* samples from r(k) to the drive, >= Np; Np alone */
-    hsep_int horizon;       /* samples that are predicted, >= preview, in a compensator's plan; Np alone */
+    hsep_compensator_settings compensator; /* a predictor has none */
+    hsep_int preview;                      /* samples from r(k) to the drive, >= Np; a predictor's: Np */
+    hsep_int horizon;       /* samples that are predicted, >= preview, in a compensator's plan; else Np */
     hsep_int n_lost;        /* samples without a measurement after which a compensator's change fades; 0: never */
     hsep_real n_init;       /* samples of warm-up from the beginning; whole, >= 0 */
     int planned;            /* whether a compensator decides the commands of a window when it begins */

@@ -83,7 +83,7 @@ static void averaged_fold(hsep_averaged *self, hsep_int kind, hsep_int k, const 
     }
     hsep_copy(to + p, rows + k * n_static, n_static);
     to[gram->n] = lags[-1];
-    /* Behind early samples the next solutions may have begun. */
+    /* After early samples the next solutions may have begun. */
     for (hsep_int i = HSEP_REGRESSIONS; k >= self->early && i < HSEP_REGRESSIONS_END; i++) {
         hsep_solution *solution = hsep_averaged_solution(self, i);
         if (hsep_averaged_kind_of(self, i) == kind && solution != NULL && solution->begun) {
@@ -121,7 +121,7 @@ static void averaged_prepare(hsep_averaged *self, const hsep_real e[])
     memcpy(scales, self->learned.scales, sizeof scales);
     memcpy(errors, self->learned.errors, sizeof errors);
     if (self->n_accepted > 0.0) {
-        averaged_judge_experts(self, e, self->known, scales, errors); /* those behind are not bridged yet */
+        averaged_judge_experts(self, e, self->known, scales, errors); /* later ones are not bridged yet */
     }
     hsep_averaged_prepare_solutions(self, scales, errors);
 }
@@ -273,7 +273,7 @@ static void averaged_judge(hsep_averaged *self, const hsep_real e[])
     if (hsep_averaged_doubts(self) && stack->weights[fresh] > HSEP_AVERAGING_DISCARD_ABOVE &&
         stack->evidence[0] + of_led > HSEP_AVERAGING_DISCARD_ERROR * largest * stack->evidence[1] &&
         (of_led - of_fresh) * (seen / unit) > HSEP_AVERAGING_DISCARD_HARM * unit) {
-        /* All experts go on with this run alone, and are judged anew; their solutions begin at once. */
+        /* All experts go on with only this run, and are judged anew; their solutions begin at once. */
         for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
             hsep_warm_start_forget_earlier(hsep_averaged_evidence(self, i));
         }
@@ -309,7 +309,7 @@ HSEP_API void hsep_averaged_learn(
     while (self->followed < self->Np) {
         averaged_follow_sample(self, x_pb, e, fold);
     }
-    if (self->known < self->Np) { /* none is believed behind it */
+    if (self->known < self->Np) { /* none is believed after it */
         averaged_bridge(self, e, 0);
         averaged_take_rows(self, x_pb, e, self->Np);
     }

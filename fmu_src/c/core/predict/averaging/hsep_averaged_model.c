@@ -45,7 +45,7 @@ HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_predict
     self->given_variance = averaging->noise_std * averaging->noise_std;
     self->forgetting_factor = averaging->forgetting > 0.0 ? hsep_exp(-Np * settings->T_s / averaging->forgetting) : 1.0;
     const hsep_real n_static = (hsep_real)self->n_static;
-    self->largest = hsep_take(&end, n_static); /* behind what else is learned */
+    self->largest = hsep_take(&end, n_static); /* after what else is learned */
     self->forecast_largest = hsep_take(&end, n_static);
     self->x = hsep_take(&end, n);
     self->measured = hsep_take(&end, Np);

@@ -27,7 +27,7 @@
 #define HSEP_AVERAGED_MOST \
     (HSEP_COMMAND_FEATURES > HSEP_DISTURBANCES_MOST ? HSEP_COMMAND_FEATURES : HSEP_DISTURBANCES_MOST)
 
-/* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. Behind
+/* What has been learned besides the rows: the numbers of a weights file, in this order, in the library, too. After
  * them are the largest magnitudes of the features without lags. */
 typedef struct {
     hsep_real velocity_scale; /* m/s, of the friction features; 0 before any motion */
@@ -144,7 +144,7 @@ HSEP_API void hsep_averaged_prepare_solutions(
  * machine may have changed meanwhile. */
 HSEP_API void hsep_averaged_restart(hsep_averaged *self);
 
-/* Predict the residual e, (n + p,), m, in the samples 0 ... last - 1 that come next; behind it the last residuals,
+/* Predict the residual e, (n + p,), m, in the samples 0 ... last - 1 that come next; after it the last residuals,
  * as measured. x_d: commands, x_pb: physics-based prediction, (n,), m; path: unmodified commands of the last n_path
  * of them, m, of a compensator; or NULL. Cost: for each expert a hsep_solution_finish, last m^2 / 2 multiply-adds
  * with its m features and last n / 2; 6 n tanh. */
@@ -174,7 +174,7 @@ HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real
 /* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_AVERAGED_PACE of them in a
  * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
  * residuals; where a measurement is not believed, the predicted one, shifted as the believed ones beside it are off;
- * behind it those before. A sample costs a hsep_gram_fold for each residual, and behind early samples a share of the
+ * after it the earlier ones. A sample costs a hsep_gram_fold for each residual, and after early samples a share of the
  * next window's solutions. */
 HSEP_API void hsep_averaged_follow(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last);

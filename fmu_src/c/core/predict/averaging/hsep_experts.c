@@ -136,7 +136,7 @@ static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_int
     }
 }
 
-/* Variances of samples, those of the rows carried through the impulse response, and what they leave of a prediction. */
+/* Variances of samples, the rows' carried through the impulse response, and what they leave of a prediction. */
 static void expert_vary(hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int apart)
 {
     const hsep_real most = HSEP_EXPERTS_DIVERGED * self->bound * self->bound;

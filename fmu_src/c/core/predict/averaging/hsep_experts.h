@@ -28,11 +28,11 @@ typedef struct {
     hsep_real largest_square; /* m2, largest mean square of a window, and */
     hsep_real bound;          /* m, bound on the prediction, as it was made */
     hsep_int lag_scales;      /* (p,) prior standard deviations of the weights of the lags */
-    hsep_int run;             /* (n + p,) m, the recursion, behind it measured residuals */
+    hsep_int run;             /* (n + p,) m, the recursion, after it measured residuals */
     hsep_int unshrunk;        /* (n + p,) m, the same within bounds */
     hsep_int e_h;             /* (n,) m, shrunk by its variance, and bounded */
     hsep_int shrinkage;       /* (n,) what the variance leaves of it */
-    hsep_int response;        /* (n + p,) the recursion's impulse response, behind it 0 */
+    hsep_int response;        /* (n + p,) the recursion's impulse response, after it 0 */
     hsep_int squares;         /* (n,) its squares, oldest first */
     hsep_int variances;       /* (n,) m2, of the rows */
     hsep_int solution;        /* hsep_solution, whose head are the lags */
@@ -66,7 +66,7 @@ static inline const hsep_real *hsep_expert_weights(const hsep_expert *self)
     return hsep_at_const(solution, solution->weights);
 }
 
-/* Take the penalties that the next weights are solved for with from the rows so far, those of earlier runs weighed by
+/* Take the penalties that the next weights are solved for with from the rows so far, earlier runs' weighed by
  * weight. first, least: m2, variance of the noise while it is not known, and the least one. */
 HSEP_API void hsep_expert_prepare(
     hsep_expert *self, hsep_warm_start *evidence, hsep_real weight, const hsep_expert_errors *errors, hsep_real first,

@@ -2,7 +2,7 @@
 
 #define DISTURBANCES_TOGETHER 64 /* samples that are filtered in one go */
 
-/* Filter i before the window; behind all of these are the filters after the samples that were tried. */
+/* Filter i before the window; after all of these are the filters after the samples that were tried. */
 static hsep_physics *disturbances_filter(hsep_disturbances *self, hsep_int i)
 {
     return hsep_part(self, self->filters + i * self->filter_words);

@@ -13,7 +13,7 @@
 #include "hsep_window.h"
 
 #define HSEP_DISTURBANCES_OF_COMMAND (HSEP_FEATURES_N_FRICTION + HSEP_FEATURES_N_STOPS)
-#define HSEP_DISTURBANCES_STIFFNESS HSEP_DISTURBANCES_OF_COMMAND /* place, behind friction and stop operators */
+#define HSEP_DISTURBANCES_STIFFNESS HSEP_DISTURBANCES_OF_COMMAND /* place, after friction and stop operators */
 #define HSEP_DISTURBANCES_DAMPING (HSEP_DISTURBANCES_STIFFNESS + 1)
 #define HSEP_DISTURBANCES_MAX (HSEP_FEATURES_N_LASTING + HSEP_FEATURES_N_PERIODIC)
 #define HSEP_DISTURBANCES_PAST (HSEP_FEATURES_DIFFERENCES + 1) /* predictions that differences need */
@@ -35,12 +35,12 @@ typedef struct {
     hsep_real period;      /* m, of a disturbance that repeats with the position; 0: none */
     hsep_real origin;      /* m, the start: what repeats does not know of it */
     hsep_int of_motion;    /* whether the position's own velocity is damped; else the velocity of x_pb, which
-                              * behind a compensator turns with every change of the command, far from the motion */
+                              * under a compensator turns with every change of the command, far from the motion */
     hsep_real T_s;         /* s */
     hsep_disturbed before; /* the window that comes next */
     hsep_disturbed after;  /* the samples that were tried last */
     hsep_int filter_words; /* words of a filter */
-    hsep_int filters;      /* offset of the hsep_physics of each disturbance before the window, and behind them after
+    hsep_int filters;      /* offset of the hsep_physics of each disturbance before the window, then after
                               * the samples that were tried last */
 } hsep_disturbances;
 
@@ -94,7 +94,7 @@ HSEP_API hsep_real hsep_disturbances_turned(const hsep_disturbances *self, const
 /* End the window, which are the samples that were tried last. */
 HSEP_API void hsep_disturbances_end(hsep_disturbances *self);
 
-/* Velocity of the change of sign of friction i, m/s, or distance of a stop operator, m, which are behind friction;
+/* Velocity of the change of sign of friction i, m/s, or distance of a stop operator, m, which are after friction;
  * velocity of the damping at place j of n samples, m/s; angle within the period at a position, rad, 0 without one. */
 HSEP_API hsep_real hsep_disturbances_spread(hsep_real velocity_scale, hsep_int i);
 HSEP_API hsep_real hsep_disturbances_damped_velocity(

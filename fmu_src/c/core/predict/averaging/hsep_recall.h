@@ -16,7 +16,7 @@ typedef struct {
     hsep_int Np;         /* samples of a window */
     hsep_int n;          /* samples of a prediction: from the last residual to the last command */
     hsep_real fading;    /* of a sum from one comparison to the next */
-    hsep_real same;      /* distance, relative to moved, below which the shortest lag is taken: behind a compensator */
+    hsep_real same;      /* distance, relative to moved, below which the shortest lag is taken: under a compensator */
     hsep_real moved;     /* m2, sum of the squares of the changes */
     hsep_int heard;      /* commands of this window that came */
     hsep_int oldest;     /* place of the command a stride ago, */

@@ -15,7 +15,7 @@ typedef struct {
     hsep_int states;            /* (n_states + dead_time,) state of a motion by one metre a sample */
     hsep_int state;             /* (n_states + dead_time,) m, the one that is tried */
     hsep_int response;          /* (n + Np,) m, to it, oldest first */
-    hsep_int responses;         /* (n_states, n) to each state of the modes alone, oldest first */
+    hsep_int responses;         /* (n_states, n) to each state of only the modes, oldest first */
     hsep_int weights;           /* (n_states,) m, change of the state */
     hsep_int trial, regression; /* the physics model on its own; least squares */
 } hsep_start;
@@ -146,7 +146,7 @@ static inline int hsep_start_estimate(hsep_start *self, const hsep_real x_d[], c
 }
 
 /* After that: add the motion to commands and physics-based prediction of the window, (n,), m, to the prediction of the
- * Np samples behind it, oldest first, and to the state of the physics model behind all of these. */
+ * Np samples after it, oldest first, and to the state of the physics model after all of these. */
 static inline void hsep_start_apply(
     const hsep_start *self, hsep_real x_d[], hsep_real x_pb[], hsep_real ahead[], hsep_physics *physics)
 {

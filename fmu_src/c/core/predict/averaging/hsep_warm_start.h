@@ -34,7 +34,7 @@ static inline hsep_real hsep_warm_start_n_rows(hsep_warm_start *self)
     return hsep_warm_start_of_run(self)->n_rows + hsep_warm_start_earlier(self)->n_rows;
 }
 
-/* Go on with the rows of this run alone; with all rows as rows of this run; with none. */
+/* Go on with only the rows of this run; with all rows as rows of this run; with none. */
 static inline void hsep_warm_start_forget_earlier(hsep_warm_start *self)
 {
     hsep_warm_start_earlier(self)->n_rows = 0.0;
