@@ -353,7 +353,7 @@ static hsep_int newton_of_columns(hsep_newton *self, hsep_int first)
 }
 
 /* What all parts of the longest plan count as, samples of whose window are predicted already. A second length of a
- * Newton step, rarely tried, adds a prediction. */
+ * Newton step, rarely tried, adds a prediction where it is, and so does what begins after it. */
 static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, hsep_int predicted)
 {
     const hsep_int window = self->late + self->Np, beyond = self->preview - self->Np;
@@ -473,6 +473,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->gains = 1;
         for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
             if (!self->gains) { /* what was predicted last was no better */
+                self->left += 2 * NEWTON_PREDICTION;
                 NEWTON_PREDICT(8, 9, hsep_at(self, self->best));
             }
             NEWTON_YIELD(10, NEWTON_SOME);
@@ -499,6 +500,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
             }
             self->tries = self->status != HSEP_PLAN_FAILED ? 0 : HSEP_NEWTON_TRIES;
             for (; !self->gains && self->tries < HSEP_NEWTON_TRIES; self->tries++) {
+                self->left += self->tries > 0 ? 2 * NEWTON_PREDICTION : 0;
                 NEWTON_PREDICT(16, 17, c);
                 newton_judge(self, task);
             }
