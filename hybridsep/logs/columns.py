@@ -62,6 +62,8 @@ def choose_columns(
             remarks = [*remarks, f"column {brief(time)} is read as the time; columns (--t) names another"]
         elif not time_needed:
             time = _row_labels(source)
+    if time and "t" not in given and not time_needed and plain_name(_stated(source, time)) in _COUNTS:
+        time = None  # it counts samples, and the interval is given
     if time is not None or "t" in given or time_needed:
         chosen = {"t": time, **chosen}
     speeds = [name for role, name in chosen.items() if role != "t" and name and has_word("velocity", name)]

@@ -160,7 +160,7 @@ def read_log(
     chosen = {**chosen, **signal_columns(source, chosen)}
     block, resampling = side_by_side(source, chosen, resample=resample)
     read, repeats = _without_repeats(_checked(path, block, chosen))
-    _check_alternation(path, read.get("t", np.arange(2.0)), read["x_d"])
+    _check_alternation(path, read.get("t", np.arange(2.0)), read["x_d"], read["x"])
     own = {what: chosen[what].unit.factor * read[what] for what in SIGNALS if what in chosen}
     signals = {what: values for what, values in own.items() if not np.isnan(values).all()}
     x_d, x_meas = (chosen[role].unit.factor * read[role] for role in ("x_d", "x"))
@@ -237,11 +237,15 @@ def _without_repeats(read: dict[str, Array]) -> tuple[dict[str, Array], str]:
     return {role: np.delete(one, repeats) for role, one in read.items()}, said
 
 
-def _check_alternation(path: Path, t: Array, x_d: Array) -> None:
-    """Raise LogError if rows of k axes follow each other: times repeat, and commands move far less over k rows."""
+def _check_alternation(path: Path, t: Array, x_d: Array, x: Array) -> None:
+    """Raise LogError if rows of k axes follow each other: times repeat, and positions move far less over k rows."""
     k = round(len(t) / (np.count_nonzero(np.diff(t)) + 1))
-    if 1 < k < len(t) and np.abs(x_d[k:] - x_d[:-k]).sum() < 0.2 * np.abs(np.diff(x_d)).sum():
+    if 1 < k < len(t) and all(_step(one, k) < 0.2 * _step(one, 1) for one in (x_d, x)):
         raise LogError(f"{path}: rows of {k} axes follow each other; write those of one into a file of their own")
+
+
+def _step(signal: Array, k: int) -> float:
+    return float(np.nansum(np.abs(signal[k:] - signal[:-k])))
 
 
 def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, str]) -> Iterator[str]:

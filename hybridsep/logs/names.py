@@ -36,7 +36,8 @@ _SOLL, _IST = {"sollposition", "solllage", "lagesollwert"}, {"istposition", "ist
 _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "sp", "des", "desired", "target"}
 _COMMANDED |= {"commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"} | _SOLL
 _MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "pv", "ist"} | _IST
-_MEASURED |= {"estimate", "estimated", "mesure", "istwert"}
+_MEASURED |= {"mesure", "istwert"}
+_ESTIMATED = {"estimate", "estimated"}  # measured where nothing else is
 _POSITION = {"pos", "position", "positions", "lage", "angle", "pl", "pctrl", "pulses"} | _SOLL | _IST
 _FILLING = {"axis", "value", "values", "data", "state", "states", "current"}
 _SENT = {"control", "input"}  # commanded beside a word for the position, else a controller's output
@@ -54,7 +55,7 @@ _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|\W")
 _POS = re.compile(r"(?<=[a-z\d])(pos)(?![a-z])", re.IGNORECASE)
 _AXIS = re.compile(r"([xyzabcqj]|joint|theta|phi|psi)?_?\d*", re.IGNORECASE)
 _ACTUAL = re.compile(r"(?<=\.)Actual(?=Position)")
-_COLUMN = re.compile(r"\[(\d+)\]$")
+_COLUMN = re.compile(r"[\[(](\d+)[\])]$")
 """Names of axes that need no word for the position: x_cmd is one, v_cmd a velocity; ``q[0]`` is a matrix's column."""
 
 
@@ -76,30 +77,36 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Return commanded and measured position by axis: ``X1_CommandPosition``, ``X1_ActualPosition`` of ``X1``."""
     commanded: dict[str, str] = {}
     measured: dict[str, str] = {}
+    estimated: dict[str, str] = {}
     positions: dict[str, str] = {}  # of columns that say nothing else, joint_pos_1 beside joint_pos_target_1
     whole: dict[str, list[str]] = {"x_d": [], "x": []}
-    for name in sorted(names, key=lambda one: "target" in one.lower()):  # that of a whole move, where there is another
+    # That of a whole move or of another instant, where there is another
+    for name in sorted(names, key=lambda one: any(word in one.lower() for word in ("target", "planned", "nominal"))):
         if column := _COLUMN.search(stated_unit(name)[0]):  # of a matrix that is called x_d
             known = [_spelling(name[: column.start()]) in _NAMES[role] for role in ("x_d", "x")]
             if any(known):
                 (commanded if known[0] else measured).setdefault(column[1], name)
                 continue
         words, axis = {token.lower() for token in _tokens(name)}, _axis(name)
-        if words & _NO_POSITION:
-            continue
         is_position = not words.isdisjoint(_POSITION)
-        kinds = [bool(words & known) for known in (_COMMANDED | _SENT if is_position else _COMMANDED, _MEASURED)]
+        # A motor's current, and what a controller of the position sends, are none
+        if words & _NO_POSITION or words >= {"control", "output"} or ("current" in words and not is_position):
+            continue
+        sent = _COMMANDED | _SENT if is_position else _COMMANDED
+        kinds = [bool(words & known) for known in (sent, _MEASURED | _ESTIMATED)]
         if not any(kinds) and is_position:
             positions.setdefault(axis, name)
         elif sum(kinds) == 1 and (is_position or _AXIS.fullmatch(axis)):
-            (commanded if kinds[0] else measured).setdefault(axis, name)
+            kind = estimated if words & _ESTIMATED else measured
+            (commanded if kinds[0] else kind).setdefault(axis, name)
             if is_position:
                 whole["x_d" if kinds[0] else "x"].append(name)
     for axis, name in measured.items():  # a PLC's Axis.Position and Axis.ActualPosition
         if (own := _ACTUAL.sub("", name)) != name and own in names:
             commanded.setdefault(axis, own)
-    bare = {axis: name for name in names[::-1] if (axis := stated_unit(name)[0]) and axis in commanded}  # q and q_des
-    measured = {**bare, **positions, **measured}
+    plain = {name: _COLUMN.sub(r"_\1", stated_unit(name)[0]) for name in names[::-1]}
+    bare = {axis: name for name, axis in plain.items() if axis and axis in commanded}  # q and q_des
+    measured = {**estimated, **bare, **positions, **measured}
     found = {axis: (x_d, measured[axis]) for axis, x_d in commanded.items() if axis in measured}
     # A compensation is added to what enters the position loop; what was planned is another instant's
     found = {axis: (signals_of(names, x).get("loop_command", x_d), x) for axis, (x_d, x) in found.items()}
@@ -122,7 +129,7 @@ def _axis(name: str) -> str:
     for token in _tokens(name):
         if not token.isalnum():
             gap = gap or ("_" if token == " " else token)
-        elif token.lower() not in _COMMANDED | _SENT | _MEASURED | _POSITION | _FILLING:
+        elif token.lower() not in _COMMANDED | _SENT | _MEASURED | _ESTIMATED | _POSITION | _FILLING:
             left, gap = f"{left}{gap if left else ''}{token}", ""
     return left
 

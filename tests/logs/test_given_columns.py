@@ -223,7 +223,10 @@ OF_TOOLS = (
     "target | angle | voltage; theta_des | theta; J{}_cmd | J{}_fb @ J3; x_cmd_counts | x_fb_counts; "
     "target_position | current_position | current; log.x_d.Data | log.x.Data; "
     "Sollposition [unit] | Istposition [unit]; X_SollPos | X_IstPos; Lagesollwert Achse X | Lageistwert Achse X; "
-    "Position command | Position actual | Position command velocity | Position actual velocity"
+    "Position command | Position actual | Position command velocity | Position actual velocity; "
+    "q_des | q | current_setpoint | current_feedback; Y_cmd | Y_act | Y_estimate | Y_planned; "
+    "Z_ref | Z_act | Z_nominal; reference_position | position | estimated_position; q_des({}) | q({}) @ 1; "
+    "q_des[{}] | q[{}] @ 1; x_d({}) | x({}) @ 1"
 )
 """Commanded and measured position, then others, as controllers, drives and recorders call them; and the axis."""
 
@@ -237,6 +240,10 @@ def test_names_of_robots_and_controllers(one: str) -> None:
         log = read_log({name: data[name] for name in order}, T_s=1e-3, axis=axis, unit="mm")
         np.testing.assert_allclose((log.x_d, log.x_meas), (n * X_D, n * X), rtol=1e-15)
         assert log.columns == tuple(name.format((axis or "").strip("aJ")) for name in names[:2])
+
+
+def test_ticks_need_no_unit_where_the_interval_is_given() -> None:
+    assert read_log({"time_ticks": 1e4 * np.arange(len(X)), "x_d": X_D, "x": X}, T_s=1e-3).T_s == 1e-3
 
 
 def test_units_of_names() -> None:
@@ -264,5 +271,7 @@ def test_odd_arguments_are_refused_before_the_log_is_read(known: dict[str, Any],
 
 def test_messages_name_pythons_arguments_too() -> None:
     refused(r"name it: --x NAME; in Python by columns=\{'x': NAME\}$", {"x_d": X_D, "goal": X}, T_s=1e-3)
+    for names in (("current_cmd", "current_fb"), ("position control output", "position")):
+        refused("'x_d', 'x' are missing", dict(zip(names, (X_D, X), strict=True)), T_s=1e-3)
     with pytest.raises(LogError, match=r"in Python by columns=\{'t': NAME\}, or T_s=SECONDS$"):
         hybridsep.fit({"x_d": X_D, "x": X})

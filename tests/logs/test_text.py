@@ -95,7 +95,10 @@ def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
         ),
         ("t,pos_err\n0,1\n", "an error alone tells no command"),
         ("t,vel_cmd,vel_act\n0,1,2\n", r"columns 'x_d', 'x' are missing, .*; velocities are none: record positions$"),
-        ("t,axis,x_d,x\n" + "".join(f"{k // 2},{'XY'[k % 2]},{k % 2},0\n" for k in range(9)), "rows of 2 axes follow"),
+        (
+            "t,axis,x_d,x\n" + "".join(f"{k // 2},{'XY'[k % 2]},{k % 2},{k % 2}\n" for k in range(9)),
+            "rows of 2 axes follow",
+        ),
         ("t,x_d,x\n0;0;0\n", "line 2: column 't' must be a number, got '0;0;0'"),
     ],
 )
