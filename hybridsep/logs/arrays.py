@@ -199,9 +199,9 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
         for field in names:
             yield from _fields(f"{name}.{field}", value[field].reshape(-1)[0])
     elif names and value.size < 1000 and "values" in names:  # of Simulink, one for each signal of a scope
-        for i, one in enumerate(value.ravel()):
-            label = str(np.ravel(one["label"])[:1].squeeze()) if "label" in names else ""
-            yield from _fields(f"{name}.{label or i}", one["values"])
+        labels = ["".join(map(str, np.ravel(one["label"])[:1])) if "label" in names else "" for one in value.ravel()]
+        for i, (label, one) in enumerate(zip(labels, value.ravel(), strict=True)):
+            yield from _fields(f"{name}.{label if label and labels.count(label) == 1 else i}", one["values"])
     else:
         yield name, value
         if getattr(getattr(value, "dtype", None), "kind", "") == "c":  # a frequency response

@@ -101,6 +101,10 @@ def test_structs(tmp_path: Path) -> None:
         io.savemat(path, one)
         log = read_log(path)
         np.testing.assert_array_equal((log.t, log.x_d, log.x_meas), [data[role] for role in ("t", "x_d", "x")])
+    for label in ("", "twice"):
+        signals["label"] = label
+        io.savemat(path, {"rec": {"time": data["t"], "signals": signals}})
+        assert read_log(path, columns={"x_d": "rec.signals.0", "x": "rec.signals.1"}).x_meas[7] == data["x"][7]
     io.savemat(path, {"run1": data, "run2": data})
     refused(r"column x_d may be 'run1\.x_d', 'run2\.x_d'; name it: --x_d NAME", path)
     assert len(read_log(path, columns={"x_d": "run2.x_d", "x": "run2.x"}).t) == 50
