@@ -27,7 +27,7 @@ typedef struct {
     hsep_int commands;   /* (stride,) m, the last ones, ring */
     hsep_int changes;    /* (size + stride,) m, ring: older ones are overwritten while these are compared */
     hsep_int residuals;  /* (size,) m, ring */
-    hsep_int repeats;    /* (size,) how often each came before, as far as it was alike, ring */
+    hsep_int repeats;    /* (size,) how often each came before, as far as it was alike, ring; under a compensator */
     hsep_int distances;  /* (size,) m2, of the lags 1 ... size */
     hsep_int found;      /* lag that the window is recalled with, */
     hsep_real alike;     /* and how much that counts */
@@ -47,7 +47,7 @@ static inline hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predic
     self->commands = hsep_take(&end, (hsep_real)self->stride);
     self->changes = hsep_take(&end, (hsep_real)(self->size + self->stride));
     self->residuals = hsep_take(&end, (hsep_real)self->size);
-    self->repeats = hsep_take(&end, (hsep_real)self->size);
+    self->repeats = hsep_take(&end, self->same > 0.0 ? (hsep_real)self->size : 0.0);
     self->distances = hsep_take(&end, (hsep_real)self->size);
     return end * sizeof(hsep_real);
 }
@@ -121,15 +121,15 @@ static inline void hsep_recall_append_command(hsep_recall *self, hsep_real comma
 static inline void hsep_recall_remember(hsep_recall *self, const hsep_real e[])
 {
     hsep_real *residuals = hsep_at(self, self->residuals), *repeats = hsep_at(self, self->repeats);
-    const hsep_real alike = self->same > 0.0 ? self->alike : 0.0;
     for (hsep_int j = self->size > 0 ? self->Np : 0; j-- > 0;) {
         self->remembered = (self->remembered > 0 ? self->remembered : self->size) - 1;
+        hsep_real kept = 0.0;
         const hsep_int then = (self->remembered + self->found) % self->size;
-        const hsep_real count = alike * (repeats[then] + 1.0);
-        const hsep_real kept =
-            count < HSEP_AVERAGING_RECALL_REPEATS ? 0.0 : (1.0 - HSEP_AVERAGING_RECALL_SHARE) * alike;
+        if (self->same > 0.0) {
+            const hsep_real count = repeats[self->remembered] = self->alike * (repeats[then] + 1.0);
+            kept = count < HSEP_AVERAGING_RECALL_REPEATS ? 0.0 : (1.0 - HSEP_AVERAGING_RECALL_SHARE) * self->alike;
+        }
         residuals[self->remembered] = e[j] + kept * (residuals[then] - e[j]);
-        repeats[self->remembered] = count;
     }
 }
 
