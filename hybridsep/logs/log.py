@@ -240,12 +240,9 @@ def _without_repeats(read: dict[str, Array]) -> tuple[dict[str, Array], str]:
 def _check_alternation(path: Path, t: Array, x_d: Array, x: Array) -> None:
     """Raise LogError if rows of k axes follow each other: times repeat, and positions move far less over k rows."""
     k = round(len(t) / (np.count_nonzero(np.diff(t)) + 1))
-    if 1 < k < len(t) and all(_step(one, k) < 0.2 * _step(one, 1) for one in (x_d, x)):
+    moved = [[np.nansum(np.abs(one[n:] - one[:-n])) for n in (k, 1)] for one in (x_d, x)]
+    if 1 < k < len(t) and all(over_k < 0.2 * over_one for over_k, over_one in moved):
         raise LogError(f"{path}: rows of {k} axes follow each other; write those of one into a file of their own")
-
-
-def _step(signal: Array, k: int) -> float:
-    return float(np.nansum(np.abs(signal[k:] - signal[:-k])))
 
 
 def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, str]) -> Iterator[str]:
