@@ -374,6 +374,8 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
             runs.sort(key=lambda run: run[1] - run[0] < 3)  # fewer rows are a preamble's, where there are more
             found = (_with_names(rows, *run, delimiter) for run in runs)
             if (table := next(filter(None, found), None)) is not None:
+                early = (_with_names(rows, *run, delimiter) for run in runs if rows[run[0]][0] < table.first)
+                table = next((one for one in early if one and one.names == table.names), table)  # written again
                 n = max(end - start for start, end in runs if rows[start][0] >= table.first)
                 # That blanks divide a timestamp makes no column
                 tables.append(((n, width - (delimiter is None and bool(table.clocks))), table))

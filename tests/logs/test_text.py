@@ -162,10 +162,10 @@ def test_a_blank_command_is_as_before(tmp_path: Path) -> None:
 
 
 def test_lines_without_numbers_are_said(tmp_path: Path) -> None:
-    rows = [*ROWS[:10], "overrun", *ROWS[10:20], "t,x_d,x", *ROWS[20:], "end of recording"]
+    rows = [ROWS[0], "t,x_d,x", *ROWS[1:20], "overrun", *ROWS[20:], "end of recording"]
     log = read_log(write_csv(tmp_path / "log.csv", "\n".join(["t,x_d,x", *rows])))
     assert len(log.t) == 50
-    assert log.remarks == ("3 lines without numbers among the rows left out, line 12 first: 'overrun'",)
+    assert log.remarks == ("3 lines without numbers among the rows left out, line 3 first: 't,x_d,x'",)
 
 
 @pytest.mark.parametrize(
