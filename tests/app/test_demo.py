@@ -23,7 +23,6 @@ from hybridsep.demo.cases import demo, demo_files
 from hybridsep.plants.trajectory import spiral
 
 PAGE = (ROOT / "docs" / "evidence" / "figures.md").read_text(encoding="utf-8")
-PNG = b"\x89PNG\r\n\x1a\n"
 CASES = ("staircase", "spiral_x", "spiral_y")
 
 
@@ -62,7 +61,7 @@ def full(session_folder: Path) -> Demonstration:
 
 def check_files(shown: Demonstration, figures: list[str], *, full: bool) -> None:
     for name in figures:
-        assert (shown.out / f"{name}.png").read_bytes().startswith(PNG)
+        assert (shown.out / f"{name}.png").read_bytes().startswith(b"\x89PNG\r\n\x1a\n")
     written = {path for path in shown.out.rglob("*") if path.is_file()}
     assert written == set(demo_files(shown.out, full=full))
     assert shown.fractions == sorted(shown.fractions)

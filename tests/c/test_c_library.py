@@ -213,12 +213,11 @@ def test_fast_math_is_refused(tmp_path: Path) -> None:
 
 
 COMPILERS = {"gcc": ["gcc"], "clang": ["clang"], "zig": zig()}
-STANDARDS = ("c99", "c11", "c17", "c2x", "gnu17")
 
 
 @pytest.mark.nightly
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "standard"), list(product(COMPILERS, STANDARDS)))
+@pytest.mark.parametrize(("name", "standard"), list(product(COMPILERS, ("c99", "c11", "c17", "c2x", "gnu17"))))
 def test_compilers_take_it_without_a_warning(name: str, standard: str, tmp_path: Path) -> None:
     """Also where a system's headers define the short names that some of them do (complex.h, termios.h, sys/param.h)."""
     command = COMPILERS[name]

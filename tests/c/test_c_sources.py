@@ -14,8 +14,6 @@ from stream import COMPENSATOR, TRAJECTORY
 
 from hybridsep.fmi.c_header import all_c
 
-SUFFIXES = (".c", ".h", ".cpp")
-
 
 @pytest.mark.slow
 def test_the_c_files_are_formatted() -> None:
@@ -25,7 +23,7 @@ def test_the_c_files_are_formatted() -> None:
         path
         for folder in ("fmu_src", "tests", "benchmarks", "integrations", "docs")
         for path in (ROOT / folder).rglob("*.*")
-        if path.suffix in SUFFIXES
+        if path.suffix in (".c", ".h", ".cpp")
     ]
     assert len(files) > 60
     output_of(command, "--dry-run", "--Werror", *files)

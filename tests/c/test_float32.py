@@ -14,7 +14,6 @@ from programs import output_of
 from benchmarks.targets.cases import KINDS, OUTPUTS, Case, header, recorded
 from benchmarks.targets.targets import FLOAT32, HERE, TARGETS, Replay, build, core_sources, replay
 
-SIZES = [(20, 20), (100, 50)]
 AGREES, AGREES_PLANNED = 5e-3, 1e-2
 """Relative difference of the RMS of predictions' errors that the README states for the paper's drive, without a
 compensator and with one, whose bounded plans differ."""
@@ -95,7 +94,7 @@ def test_vectors_change_no_bit() -> None:
 @pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize("size", [(20, 20), (100, 50)], ids=str)
 @pytest.mark.parametrize("warm", [False, True])
 def test_a_processor_without_doubles_predicts_as_well(
     kind: str, size: tuple[int, int], warm: bool, tmp_path: Path

@@ -22,7 +22,6 @@ UNCARRIED = ("fmpy SSP", "fmucontainer -sequential")
 """Importers that carry nothing to the drive before the first step, and change the first measurement."""
 
 COMMANDS = {"": staircase(), "moved": staircase()[:800] + 0.1}  # m
-DELAYS = {"predictor": 100, "compensator": 200}
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +61,7 @@ def test_importers_come_to_the_same_figures(
     if not exists_here(importer):
         pytest.skip(f"{importer} has no library for this machine")
     # The first measurement, from which a compensator with averaging judges the sensor, is another there.
-    judged, delay = importer in UNCARRIED and system == "compensator", DELAYS[system]
+    judged, delay = importer in UNCARRIED and system == "compensator", {"predictor": 100, "compensator": 200}[system]
     for place, command in COMMANDS.items():
         if place and importer in UNCARRIED:
             continue

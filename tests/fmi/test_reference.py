@@ -71,11 +71,8 @@ def test_the_reference_is_short_and_that_of_a_late_measurement_is_late(fmus: Bui
     late = MACHINE.changed("compensator", {"measurement_delay": 5})
     paths = fmus("SepCompensator"), build_fmu(late, "SepCompensator", tmp_path, targets=("host",))
     last_rows = [content(path)[f"{REFERENCE_FOLDER}/SepCompensator_ref.csv"].splitlines()[-1] for path in paths]
-    rms = [float(row.split(b",")[1 + RMS_E]) for row in last_rows]
+    rms = [float(row.split(b",")[1 + OUTPUTS["SepCompensator"].index("rms_e")]) for row in last_rows]
     assert rms[1] == pytest.approx(rms[0], rel=0.2)
-
-
-RMS_E = OUTPUTS["SepCompensator"].index("rms_e")
 
 
 @pytest.mark.slow

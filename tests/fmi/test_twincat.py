@@ -17,10 +17,9 @@ from places import ROOT
 
 from hybridsep.fmi.controllers import CONFIGURATION_FILE, DEFINITIONS
 
-STAND_INS = ROOT / "tests" / "c" / "msvc"
 MICROSOFT = zig(
     *("-target", "x86_64-windows-msvc", "-fms-compatibility", "-Wmicrosoft"),
-    *("-Wvla", "-nostdlibinc", f"-isystem{STAND_INS}"),
+    *("-Wvla", "-nostdlibinc", f"-isystem{ROOT / 'tests' / 'c' / 'msvc'}"),
 )
 
 

@@ -119,10 +119,8 @@ def test_real_poles_in_any_number(zeros: list[float], poles: list[complex]) -> N
     np.testing.assert_allclose(model.frequency_response(omega), np.asarray(system(1j * omega)), rtol=1e-6)
 
 
-UNSTABLE = control.tf([1.0], [1.0, -1.0, 3.0])
-
 REFUSED: list[tuple[Any, str]] = [
-    (UNSTABLE, "G_pb must be stable, got a pole at 0.5"),
+    (control.tf([1.0], [1.0, -1.0, 3.0]), "G_pb must be stable, got a pole at 0.5"),
     (control.tf([1.0], [1.0, 0.0]), "G_pb must be stable, got a pole at 0"),
     (control.tf([2.0], [1.0]), "numerator of degree 0 over a denominator of degree 0"),
     (control.tf([1.0, 0.0, 0.0], [1.0, 1.0, 3.0]), "numerator of degree 2 over a denominator of degree 2"),

@@ -14,7 +14,6 @@ from hybridsep.predict.regression import RidgeRegression
 
 N_STATIC, N = 3, 40
 SHARES = np.array([1.0, 0.5, 0.2])
-LAG_PRIORS = np.sqrt([1.0, CONSTANTS.last_lag**0.5])
 
 
 def learned(static: Array, lags: Array, target: Array) -> RidgeRegression:
@@ -38,7 +37,7 @@ def written_out(
     static: Array, lags: Array, target: Array, rows: Array, past: Array, variance: float, p: int, largest_square: float
 ) -> tuple[Array, Array]:
     """Return the free run and the shrunk prediction, sample by sample."""
-    priors = np.concatenate((SHARES, LAG_PRIORS[:p]))
+    priors = np.concatenate((SHARES, np.sqrt([1.0, CONSTANTS.last_lag**0.5])[:p]))
     phi = np.hstack((static, lags[:, :p]))
     covariance = variance * np.linalg.inv(phi.T @ phi + variance * np.diag(1.0 / priors**2))
     w = covariance @ phi.T @ target / variance

@@ -17,7 +17,6 @@ from streams import CoreStream
 from hybridsep.base.settings import PARAMETERS
 from hybridsep.base.signals import Array
 
-SAMPLES = 40
 PAPER: dict[str, Value] = {"averaging": False, "Np": 8, "p": 4, "q": 2}
 """Small windows, so that several fit into a short run."""
 
@@ -62,7 +61,7 @@ def extreme(draw: st.DrawFn, name: str) -> float:
 
 
 positions = st.builds(
-    lambda size, seed: size * np.random.default_rng(seed).uniform(-1, 1, (SAMPLES, 2)),
+    lambda size, seed: size * np.random.default_rng(seed).uniform(-1, 1, (40, 2)),
     st.sampled_from([0.0, 1e-300, 1e-6, 1.0, 1e3]),
     st.integers(0, 9),
 )

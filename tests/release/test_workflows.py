@@ -17,10 +17,9 @@ from hybridsep.fmi.compile import ALL_TARGETS
 
 GITHUB = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 GITLAB = ROOT / ".gitlab-ci.yml"
-WORKFLOWS = [*GITHUB, GITLAB]
 
 
-@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", [*GITHUB, GITLAB], ids=lambda path: path.name)
 def test_actions_are_pinned_and_there_are_no_secrets(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     assert "secrets" not in text

@@ -22,7 +22,6 @@ from hybridsep.fmi.variables import INTERPOLATED, FmuTable
 
 TS = 1e-3  # s
 
-EXPOSE = ROOT / "tests" / "c" / "expose.c"
 MESSAGE_SIZE = 512
 
 TABLES: dict[str, FmuTable] = {}
@@ -97,7 +96,7 @@ def library(name: str) -> ctypes.CDLL:
     flags = ["-O0", "-fPIC", "-shared", f"-I{folder}", *include_flags()]
 
     def build(built: Path) -> None:
-        run_compiler([*flags, *model_sources(), EXPOSE, *object_files(), "-lm", "-o", built])
+        run_compiler([*flags, *model_sources(), ROOT / "tests" / "c" / "expose.c", *object_files(), "-lm", "-o", built])
 
     loaded = ctypes.CDLL(str(built_once(shared_builds() / f"{name}_{key}.so", build)))
     loaded.test_table.restype = ctypes.POINTER(Context)

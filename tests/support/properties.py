@@ -4,7 +4,6 @@ from hypothesis import HealthCheck, settings
 
 LEFT_OUT = ("nightly", "release")  # marks of tests that run where they are named in ``-m``, or by their own names
 
-_SHARE = 6
 _all = False
 
 
@@ -21,7 +20,7 @@ def take_profile(*, all_of_them: bool) -> None:
 
 def share(number: int) -> int:
     """Return how many of a number of examples run."""
-    return number if _all else -(-number // _SHARE)
+    return number if _all else -(-number // 6)
 
 
 def examples(number: int) -> settings:
