@@ -23,19 +23,15 @@ HEAD = 96  # bytes of a table before the start values
 @pytest.mark.parametrize(
     ("version", "form", "warned"),
     [
-        ("", "{uri}", ""),
-        ("", "{uri_with_one_slash}", ""),
-        ("", "FILE://localhost{quoted}/", ""),
-        ("", "{path}", ""),
-        ("", "{spaces}", ""),
-        ("", None, ""),
-        ("", "", "must be a file: URI on this machine"),
-        ("", "file:", "must be a file: URI on this machine"),
+        *(
+            ("", form, "")
+            for form in ("{uri}", "{uri_with_one_slash}", "FILE://localhost{quoted}/", "{path}", "{spaces}")
+        ),
+        *(("", form, "must be a file: URI on this machine") for form in ("", "file:")),
         ("", "http://example.org/%s", "must be a file: URI on this machine, got http://example.org/%%s"),
         ("", "file:///nowhere/at/all", "fmuResourceLocation, that beside the library is used; got /nowhere/at/all/"),
-        ("Fmi3", "{path}/", ""),
-        ("Fmi3", "{path}", ""),
-        ("Fmi3", None, ""),
+        *((version, None, "") for version in ("", "Fmi3")),
+        *(("Fmi3", form, "") for form in ("{path}/", "{path}")),
         ("Fmi3", "", "resourcePath must be a folder on this machine"),
         ("Fmi3", "/nowhere/at/all", "no variables.bin in resourcePath"),
         ("Fmi3", "http://example.org/%s", "resourcePath must be a folder on this machine"),
@@ -81,9 +77,8 @@ def test_uris_of_windows(tmp_path: Path) -> None:
         ("", 0, None),
     ):
         folder = ctypes.create_string_buffer(len(uri) + 2)
-        assert convert(uri.encode(), windows, folder) == (expected is not None)
-        if expected is not None:
-            assert folder.value.decode() == expected
+        found = folder.value.decode() if convert(uri.encode(), windows, folder) else None
+        assert found == expected
 
 
 # The table ---------------------------------------------------------------------------------------------------------
@@ -92,12 +87,11 @@ def test_uris_of_windows(tmp_path: Path) -> None:
 def test_a_kind_has_one_library(fmus: BuiltFmus) -> None:
     """Of drives there are two kinds, with modes and without."""
     libraries = {}
-    stages = ("FeedDrive_als25010_x", "FeedDrive_als25010_y")
-    for name in ("HybridPredictor", "HybridPredictor_emps", "FeedDrive", *stages):
+    kinds = (("HybridPredictor", "HybridPredictor_emps"), ("FeedDrive_als25010_x", "FeedDrive_als25010_y"))
+    for name in ("FeedDrive", *kinds[0], *kinds[1]):
         with zipfile.ZipFile(fmus(name)) as archive:
             libraries[name] = archive.read(f"binaries/{TARGETS[host_target()].folder}/{name}.so")
-    assert libraries["HybridPredictor"] == libraries["HybridPredictor_emps"]
-    assert libraries[stages[0]] == libraries[stages[1]]
+    assert all(libraries[one] == libraries[other] for one, other in kinds)
     assert len(set(libraries.values())) == 3
 
 

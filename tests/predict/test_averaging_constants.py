@@ -30,8 +30,6 @@ CORE_ALONE = {"predict_constants", "averaged_forecast", "averaged_learn"}
 AVERAGED = {"model": "averaged_model"}
 """Names of C's files that are not the library's: C's own `hsep_model.h` is what an adapter sees."""
 
-DECLARED = re.compile(r"\s*(static const|#define)")
-
 
 def reasoned(text: str, tree: ast.Module) -> set[int]:
     """Return the nodes of assignments with a comment or a docstring after them."""
@@ -58,7 +56,7 @@ def literals_of_library(text: str) -> Iterator[float]:
 def literals_of_core(text: str) -> Iterator[float]:
     text = re.sub(r"/\*.*?\*/|\"[^\"]*\"|HSEP_ASSERT_WORDS\([^;]*;", "", text, flags=re.DOTALL)
     for line in text.splitlines():
-        if not DECLARED.match(line):
+        if not re.match(r"\s*(static const|#define)", line):
             yield from (float(found) for found in re.findall(r"(?<![\w.])\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])", line))
 
 

@@ -206,15 +206,11 @@ def test_the_spiral_is_compensated_as_by_the_library(new_stream: StreamMaker, va
     assert_agreement(new_stream, 500, values, 1e-11, path="spiral")
 
 
-def at_rest_first(k: int, x_meas: float, last: float) -> float:
-    return x_meas if k else last
-
-
 @on_all(LOOK_AHEADS)
 def test_a_measurement_that_comes_a_sample_early_is_held(new_stream: StreamMaker) -> None:
     """As a sequential master carries it; the outputs are as with measurements in time, bit for bit."""
     values = SHORT[kind_of(new_stream.model)]
-    loop = closed_loop(new_stream.model, 300, values, sensor=at_rest_first)
+    loop = closed_loop(new_stream.model, 300, values, sensor=lambda k, x_meas, last: x_meas if k else last)
     early = replace(loop, x=np.append(loop.x[1:], loop.x[-1]))
     in_time, held = new_stream(), new_stream()
     in_time.initialise(loop.values)

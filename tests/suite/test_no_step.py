@@ -11,11 +11,7 @@ from stream import COMPENSATOR, OUTPUTS, Array, Stream
 from streams import StreamMaker, on_all
 
 FADED = 20 + 60  # samples after which the change has faded: the window and the preview of the streams
-
 HORIZON = 200  # of plans that are longer than the preview: the change fades within it
-
-NEAR = 4 * 2
-"""Samples of a spline, whose spacing is 2 in the streams: that far before and after a command that exceeds a limit."""
 
 LIMITS = {"v_max": 0.1, "a_max": 16.0, "j_max": 5000.0}
 
@@ -65,8 +61,8 @@ def test_whatever_comes_in(new_stream: StreamMaker, seed: int, horizon: int) -> 
     assert np.max(np.abs(x_dm - x_d)) > 0.0
     for order, limit in enumerate(LIMITS.values(), start=1):
         own, bound = np.abs(np.diff(x_d, order)), limit * T_S**order
-        # Near a command that exceeds a limit the limit is only the change's
-        exceeds = maximum_filter1d(own, 2 * NEAR + 1, mode="constant") > bound
+        # Within a spline (4 spacings of 2) of a command that exceeds a limit the limit is only the change's
+        exceeds = maximum_filter1d(own, 2 * 4 * 2 + 1, mode="constant") > bound
         allowed = bound + np.where(exceeds, own, 0.0)
         assert np.all(np.abs(np.diff(x_dm, order)) <= allowed * (1 + 1e-6) + 1e-12), order
     for begins in np.flatnonzero(np.diff(outputs[:, OUTPUTS[COMPENSATOR].index("alarm")]) > 0.0):

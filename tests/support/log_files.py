@@ -159,13 +159,11 @@ def _rated(data: Columns) -> dict[str, tuple[float, Any]]:
     return {name: (float(data["t"][1] - data["t"][0]), values) for name, values in data.items() if name != "t"}
 
 
-def _traced(data: Columns) -> dict[str, tuple[float, float, Any]]:
-    return {name: (float(data["t"][0]), *rated) for name, rated in _rated(data).items()}
-
-
 _RECORDERS: dict[str, Callable[[Path, Columns], object]] = {
     ".parquet": write_parquet,
-    ".xml": lambda path, data: path.write_text(trace_xml(_traced(data), kind="none")),
+    ".xml": lambda path, data: path.write_text(
+        trace_xml({name: (float(data["t"][0]), *rated) for name, rated in _rated(data).items()}, kind="none")
+    ),
     ".scope": lambda path, data: path.write_text(twincat_csv(_rated(data))),
     ".hal": lambda path, data: path.write_text(halscope_csv({name: data[name] for name in data if name != "t"})),
 }

@@ -15,7 +15,6 @@ from scipy.signal import cont2discrete, tf2ss
 from scipy.sparse import csc_matrix
 
 Array = NDArray[np.float64]
-LongArray = NDArray[np.longdouble]
 
 
 def transfer_function(modes: Sequence[tuple[float, float, float, float]]) -> tuple[Array, Array]:
@@ -70,7 +69,7 @@ def ridge(rows: Array, target: Array, lam: float) -> Array:
     return np.asarray(np.linalg.solve(R[:n, :n], R[:n, n]), dtype=np.float64)
 
 
-def ridge_extended(rows: Array, target: Array, lam: float) -> LongArray:
+def ridge_extended(rows: Array, target: Array, lam: float) -> NDArray[np.longdouble]:
     """Eq. (6), solved from all rows to the digits of long double; ``(m, n), (m,) → (n,)``.
 
     A double solution is refined, its residuals in long double: Björck, BIT 7 (1967), 257.
