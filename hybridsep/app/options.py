@@ -113,6 +113,10 @@ def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
     return _in_the_place_of("reading", list(options), lambda values: ReadingOptions(**values), command)
 
 
+_LEFT_OUT = {"v_max": "1.25 times the log's", "a_max": "twice the log's", "j_max": "5 times the log's"}  # by `fit`
+_LEFT_OUT |= {"change_max": "twice the log's largest servo error", "following_error_max": "1.3 times that error"}
+
+
 def takes_known(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command an option for each parameter that may be known of an axis.
 
@@ -120,7 +124,7 @@ def takes_known(command: Callable[..., None]) -> Callable[..., None]:
     """
     taken = []
     for one in (*map(PARAMETERS.__getitem__, PredictorSettings.KNOWN), *DRIVE_LIMIT_ENTRIES.values()):
-        option = typer.Option(f"--{one.name}", help=f"{one.help}; none, or the usual one, if left out")
+        option = typer.Option(f"--{one.name}", help=f"{one.help}; if left out {_LEFT_OUT.get(one.name, 'none')}")
         annotation = Annotated[one.kind | None, option]  # type: ignore[name-defined]
         taken.append(inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation))
     return _in_the_place_of(
