@@ -53,6 +53,16 @@ static hsep_real linearised_weight(const hsep_averaged *model, hsep_int i, hsep_
     return model->predicted[expert] && of_kind ? model->shares[expert] : 0.0;
 }
 
+/* Experts whose disturbances a change passes through. */
+static hsep_int hsep_linearised_experts(const hsep_averaged *model)
+{
+    hsep_int count = 0;
+    for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
+        count += linearised_weight(model, i, HSEP_MODEL_RESIDUAL) > 0.0;
+    }
+    return count;
+}
+
 /* The response of an expert, (preview + 3,), to a change: of the command, or of the features of x_pb. */
 static hsep_real *linearised_response(hsep_linearised *self, hsep_int i)
 {

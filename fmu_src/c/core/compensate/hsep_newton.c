@@ -330,44 +330,49 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
-/* What parts of a plan count as: what passes through the model or the solver once, for all samples of a plan; some
- * variances, or the bounds of a plan; columns abreast, with several experts; and half a prediction of a plan. */
-#define NEWTON_PASS 8
+/* What parts of a plan count as: some variances, or columns abreast by an expert; variances that are apart, which take
+ * more samples; what passes through the model or the solver once, for all samples of a plan; and half a prediction of a
+ * plan, or the slopes under it. */
 #define NEWTON_SOME 4
-#define NEWTON_COLUMNS 6
-#define NEWTON_PREDICTION 9
+#define NEWTON_APART 6
+#define NEWTON_PASS 8
+#define NEWTON_PREDICTION 12
 
 /* Parts into which a count is cut, each of at most so many. */
 static hsep_int newton_parts(hsep_int count, hsep_int most) { return (count + most - 1) / most; }
 
-/* What half a step of the solver counts as, */
-static hsep_int newton_of_half(const hsep_newton *self) { return self->m / 7; }
+/* What the products of a programme count as, or its factor, */
+static hsep_int newton_of_programme(const hsep_newton *self) { return self->m / 4; }
 
-/* the programme of a Newton step, */
-static hsep_int newton_of_products(const hsep_newton *self) { return self->m / 4; }
+/* its solution in so many halves of steps, which are a factor, then a pass, */
+static hsep_int newton_of_solution(const hsep_newton *self, hsep_int halves)
+{
+    return halves / 2 * NEWTON_PASS + (halves + 1) / 2 * newton_of_programme(self);
+}
 
 /* and columns abreast from one on. */
-static hsep_int newton_of_columns(hsep_newton *self, hsep_int first)
+static hsep_int newton_of_columns(hsep_newton *self, const hsep_newton_task *task, hsep_int first)
 {
-    return newton_parts(NEWTON_COLUMNS * (self->preview - newton_begins(self)[first]), self->preview);
+    const hsep_int full = NEWTON_SOME * (1 + hsep_linearised_experts(task->model)) / 2;
+    const int begins = first == hsep_knots_at(&task->planner->knots, first).first;
+    return newton_parts(full * (self->preview - newton_begins(self)[first]), self->preview) + (begins ? NEWTON_SOME : 0);
 }
 
 /* What all parts of the longest plan count as, samples of whose window are predicted already. A second length of a
  * Newton step, rarely tried, adds a prediction where it is, and so does what begins after it. */
-static hsep_int newton_of_plan(hsep_newton *self, const hsep_planner *planner, hsep_int predicted)
+static hsep_int newton_of_plan(hsep_newton *self, const hsep_newton_task *task, hsep_int predicted)
 {
     const hsep_int window = self->late + self->Np, beyond = self->preview - self->Np;
-    const hsep_int variances = newton_parts(window - predicted, HSEP_NEWTON_VARIED) +
-                               newton_parts(beyond, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) +
-                               newton_parts(window, HSEP_NEWTON_VARIED);
-    const hsep_int of_physics =
-        NEWTON_PASS + 2 * newton_of_half(self) * HSEP_NEWTON_PHYSICS_STEPS + 2 * NEWTON_PREDICTION;
-    hsep_int step = 2 * NEWTON_PASS + NEWTON_SOME + newton_of_products(self) +
-                    2 * newton_of_half(self) * planner->steps + 2 * NEWTON_PREDICTION;
-    for (hsep_int i = 0; i < self->m; i += newton_together(planner, i)) {
-        step += newton_of_columns(self, i);
+    const hsep_int of_physics = NEWTON_PASS + newton_of_solution(self, 2 * HSEP_NEWTON_PHYSICS_STEPS + 1);
+    hsep_int step = 2 * NEWTON_SOME + 3 * NEWTON_PREDICTION + newton_of_programme(self) +
+                    newton_of_solution(self, 2 * task->planner->steps + 1);
+    for (hsep_int i = 0; i < self->m; i += newton_together(task->planner, i)) {
+        step += newton_of_columns(self, task, i);
     }
-    return NEWTON_SOME * (variances + 1) + of_physics + self->n_steps * step + NEWTON_PASS;
+    return NEWTON_SOME * newton_parts(window - predicted, HSEP_NEWTON_VARIED) +
+           NEWTON_APART * newton_parts(beyond, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) + of_physics +
+           self->n_steps * step + 2 * NEWTON_PREDICTION + NEWTON_PASS +
+           NEWTON_SOME * newton_parts(window, HSEP_NEWTON_VARIED);
 }
 
 /* Predict more samples under a plan, up to one; the first ones with its commands. apart: as hsep_averaged_go_on's. */
@@ -415,18 +420,22 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
 /* Predict more samples of the plan with variances, up to one. */
 #define NEWTON_VARY(where, end) \
     while (self->samples < (end)) { \
-        NEWTON_YIELD(where, NEWTON_SOME + (self->samples > 0 ? 0 : NEWTON_PASS)); \
+        NEWTON_YIELD( \
+            where, self->samples > self->late + self->Np \
+                       ? NEWTON_APART \
+                       : NEWTON_SOME + (self->samples > 0 ? 0 : NEWTON_PASS)); \
         newton_vary(self, task, c); \
     }
 
-/* Solve a programme in a number of steps of its solver. */
+/* Solve a programme in a number of steps of its solver; those that it does not need are left out. */
 #define NEWTON_SOLVE(where, then, steps) \
-    NEWTON_YIELD(where, NEWTON_PASS); \
+    NEWTON_YIELD(where, newton_of_programme(self)); \
     self->status = hsep_planner_solve(planner, steps); \
-    while (self->status == HSEP_PLAN_BOUNDED) { \
-        NEWTON_YIELD(then, newton_of_half(self)); \
+    for (self->halves = 2 * (steps); self->status == HSEP_PLAN_BOUNDED; self->halves--) { \
+        NEWTON_YIELD(then, self->halves % 2 ? NEWTON_PASS : newton_of_programme(self)); \
         self->status = hsep_planner_advance(planner); \
-    }
+    } \
+    self->left -= newton_of_solution(self, self->halves)
 
 /* Make a plan, from one yield to the next. */
 static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
@@ -449,9 +458,9 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            NEWTON_YIELD(2, NEWTON_SOME);
+            NEWTON_YIELD(2, NEWTON_PASS);
             newton_open(self, task);
-            NEWTON_SOLVE(3, 4, self->follows ? HSEP_NEWTON_PHYSICS_STEPS : planner->steps)
+            NEWTON_SOLVE(3, 4, self->follows ? HSEP_NEWTON_PHYSICS_STEPS : planner->steps);
             self->planned = self->status == HSEP_PLAN_DONE;
         }
         newton_copy(self, of_physics, c);
@@ -463,9 +472,9 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->cost_of_rest = self->cost;
         if (self->ends) {
             newton_copy(self, c, rest);
-            NEWTON_YIELD(5, NEWTON_SOME);
+            NEWTON_YIELD(5, NEWTON_PASS);
             hsep_planner_end(planner, task->x_d);
-            NEWTON_SOLVE(6, 7, planner->steps)
+            NEWTON_SOLVE(6, 7, planner->steps);
         }
 
         /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
@@ -479,19 +488,19 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
             NEWTON_YIELD(10, NEWTON_SOME);
             newton_copy(self, c, hsep_at(self, self->best));
             hsep_planner_open(planner, task->x_d, 1, self->bound); /* the model follows the friction */
-            NEWTON_YIELD(11, NEWTON_PASS);
+            NEWTON_YIELD(11, NEWTON_PREDICTION);
             (void)newton_errors(self, task);
             hsep_linearised_at(
                 hsep_part(self, self->linearised), task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb),
                 self->reach);
             for (self->spline = 0; self->spline < self->m;) {
-                NEWTON_YIELD(12, newton_of_columns(self, self->spline));
+                NEWTON_YIELD(12, newton_of_columns(self, task, self->spline));
                 newton_columns(self, task);
             }
-            NEWTON_YIELD(13, newton_of_products(self));
+            NEWTON_YIELD(13, newton_of_programme(self) + NEWTON_SOME);
             newton_products(self, planner);
             hsep_planner_complete(planner, planner->jerk_weight);
-            NEWTON_SOLVE(14, 15, planner->steps)
+            NEWTON_SOLVE(14, 15, planner->steps);
             self->gains = 0;
             if (self->status != HSEP_PLAN_FAILED) {
                 self->wider = hsep_fmin(HSEP_NEWTON_WIDER * self->reach, HSEP_NEWTON_MOST_REACH);
@@ -527,7 +536,7 @@ HSEP_API void hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, h
 {
     const hsep_int share = samples > 1 ? newton_parts(self->left, samples) : 0;
     hsep_int done = 0;
-    while (self->place != NEWTON_MADE && (samples <= 1 || done == 0 || done + self->next <= share)) {
+    while (self->place != NEWTON_MADE && (samples <= 1 || done == 0 || done + self->next / 2 <= share)) {
         done += self->next;
         newton_go_on(self, task);
     }
@@ -565,6 +574,6 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
     self->follows = self->judges && best > 1;
     self->ends = best == 0 && was_planned > 0;
     /* This sample has begun, and learned the last window */
-    self->next = 2 * NEWTON_PASS + NEWTON_SOME * newton_parts(self->samples, HSEP_NEWTON_VARIED);
-    self->left = self->next + newton_of_plan(self, task->planner, self->samples);
+    self->next = 4 * NEWTON_PASS + NEWTON_SOME * newton_parts(self->samples, HSEP_NEWTON_VARIED);
+    self->left = self->next + newton_of_plan(self, task, self->samples);
 }

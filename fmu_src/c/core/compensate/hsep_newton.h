@@ -37,6 +37,7 @@ typedef struct {
     hsep_real wider;        /* and in the next one where no length of it lowers the cost */
     hsep_int samples;       /* samples that are predicted, */
     hsep_int spline;        /* splines whose change of x_h, or row of the programme, is computed */
+    hsep_int halves;        /* halves of the solver's steps that are left of a programme */
     hsep_int status;        /* hsep_plan_status of the programme that is being solved */
     hsep_int planned;       /* model of the plan: 0 none, 1 physics, 2 averaged */
     hsep_real cost;         /* m2, of the best plan so far, */
@@ -64,7 +65,7 @@ typedef struct {
     hsep_int physics; /* G_pb at the beginning of the window, */
     hsep_int trial;   /* and for a trial */
 } hsep_newton;
-HSEP_ASSERT_WORDS(hsep_newton, 44);
+HSEP_ASSERT_WORDS(hsep_newton, 45);
 
 /* What it plans with: other blocks, and the window's data. */
 typedef struct {
