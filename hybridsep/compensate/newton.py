@@ -306,7 +306,7 @@ class AveragedPlanner:
         W = self.basis.weight[:, None] * slope
         P = W.T @ W + self.jerk_weight * (third.T @ third)
         v = W.T @ (self.basis.weight * (self.x_d - start.x_h)) - self.jerk_weight * (third.T @ start.third)
-        found = solve_change(PlanCost(P, v).regular(), bounds, start.coefficients, self.splines, TOLERANCE)
+        found = solve_change(PlanCost(P, v).regular(), bounds, start.coefficients, self.splines, 0, TOLERANCE)
         if found is None:
             return start, reach
         change = found - start.coefficients

@@ -23,7 +23,7 @@ from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
 from .limits import Bounds, DriveBounds
 from .newton import FIRST_REACH, PHYSICS_STEPS, THRICE, TOLERANCE, TWICE, AveragedPlanner, PlanModel, is_better
-from .qp import EXACT, Tolerance, solve, solve_change
+from .qp import EXACT, Tolerance, solve_change
 from .splines import N_DECIDED, SplineBasis, solved_splines
 
 _ENDS, _NEW = 5.0, 1e9
@@ -95,8 +95,7 @@ class Planning(ABC):
         self.horizon, self.spacing = basis.preview, basis.spacing
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
         self.weight: Array | None = None  # (horizon,): of the errors of a plan; without it all count alike
-        # (n_free, m): splines that a plan changes the last one by, none of them pinned; without it all at once
-        self.splines: Array | None = None
+        self.splines = np.eye(basis.n_free)  # (n_free, m): that a plan changes the last one by
 
     def restart(self) -> None:
         """Begin another run: nothing was planned."""
@@ -128,24 +127,26 @@ class Planning(ABC):
         """
 
     def affine_plan(
-        self, g: Array, free: Array, x_d: Array, preview: Preview, bounds: Bounds, tolerance: Tolerance = EXACT
+        self,
+        g: Array,
+        free: Array,
+        x_d: Array,
+        preview: Preview,
+        bounds: Bounds,
+        n_pinned: int = 0,
+        tolerance: Tolerance = EXACT,
     ) -> Array | None:
         """Return the coefficients of the best plan on a model ``g``, ``free`` of eq. (3); None if there is none.
 
-        ``x_d``, ``(preview,)``, m, counts from where ``free`` does.
+        ``x_d``, ``(preview,)``, m, counts from where ``free`` does; ``n_pinned``: splines that a bounded plan does not
+        change.
         """
-        previous_plan = preview.previous_plan
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
             return None
-        decided, jerk_weight = previous_plan[:N_DECIDED], self.settings.jerk_weight
+        last, before, jerk_weight = preview.previous_plan, preview.delta_before, self.settings.jerk_weight
         free = free + np.asarray(lfilter(g, [1.0], preview.load))
-        cost = self.basis.cost(g, free, x_d, decided, preview.delta_before, jerk_weight, self.weight)
-        last = previous_plan[N_DECIDED:]
-        if self.splines is not None:
-            cost = cost.of_change(last, self.splines).regular()
-            return solve_change(cost, bounds, previous_plan, self.splines, tolerance)
-        found = solve(cost.regular(), bounds, last, self.n_pinned, tolerance=tolerance)
-        return None if found is None else np.concatenate((decided, found.x))
+        cost = self.basis.cost(g, free, x_d, last, before, jerk_weight, self.weight).by(self.splines).regular()
+        return solve_change(cost, bounds, last, self.splines, n_pinned, tolerance)
 
     def ending(self, preview: Preview) -> Array:
         """Return the coefficients, ``(3 + n_free,)``, m, of a plan that ends compensation, smoothly and soon.
@@ -155,16 +156,16 @@ class Planning(ABC):
         """
         if preview.state_before is SepState.OFF:
             return preview.previous_plan
-        decided, last = np.split(preview.previous_plan, [N_DECIDED])
+        last = preview.previous_plan
         at_once, nothing = np.eye(1, self.horizon)[0], np.zeros(self.horizon)
         jerk_weight = (2.0 * math.sin(math.pi * _ENDS / self.horizon)) ** -6.0
-        not_pinned = np.eye(len(last))[:, self.n_pinned :]
-        cost = self.basis.cost(at_once, nothing, nothing, decided, preview.delta_before, jerk_weight)
-        cost = cost.of_change(last, not_pinned).regular()
+        not_pinned = np.eye(self.basis.n_free)[:, self.n_pinned :]
+        cost = self.basis.cost(at_once, nothing, nothing, last, preview.delta_before, jerk_weight)
+        cost = cost.by(not_pinned).regular()
         new = np.arange(len(cost.v))[-(self.Np // self.spacing) :]
         cost.P[new, new] *= _NEW
-        found = solve_change(cost, self.limits(preview), preview.previous_plan, not_pinned, self.SOLVED)
-        return preview.previous_plan if found is None else found
+        found = solve_change(cost, self.limits(preview), last, not_pinned, 0, self.SOLVED)
+        return last if found is None else found
 
     def limits(self, preview: Preview, *, may_turn: bool = False, change: float = 1.0) -> Bounds:
         """Return the drive's limits on the coefficients of a plan, and a share of the largest change."""
@@ -193,7 +194,7 @@ class PaperPlanning(Planning):
             operator = predictor.operator(self.horizon)  # Eq. (3)
         models = [(SepState.HYBRID, operator.g_h, operator.free), (SepState.PHYSICS, operator.g_pb, operator.free_pb)]
         for state, g, free in models if hybrid else models[1:]:
-            found = self.affine_plan(g, free, preview.command, preview, bounds)
+            found = self.affine_plan(g, free, preview.command, preview, bounds, self.n_pinned)
             if found is not None:
                 return ChosenPlan(state, found, None)
         return ChosenPlan(SepState.OFF, preview.previous_plan, None)
@@ -292,7 +293,7 @@ class AveragedPlanning(Planning):
         tolerance = TOLERANCE._replace(steps=PHYSICS_STEPS) if follows else TOLERANCE
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
         bounds = self.limits(preview, may_turn=most is SepState.PHYSICS, change=of_physics_change)
-        physics = self.affine_plan(g, free, path, preview, bounds, tolerance)
+        physics = self.affine_plan(g, free, path, preview, bounds, tolerance=tolerance)
         if has_learned:
             end = len(self.ahead) * self.Np
             self.ahead[-1] = model.of_previous_plan.stacked[:, end - self.Np : end]
@@ -301,7 +302,6 @@ class AveragedPlanning(Planning):
         if not has_learned:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
-            assert self.splines is not None
             jerk_weight = self.settings.jerk_weight
             planner = AveragedPlanner(self.basis, self.splines, jerk_weight, model, path, preview.delta_before)
             last = planner.point(previous_plan, prediction=model.of_previous_plan)

@@ -55,18 +55,17 @@ class Minimum(NamedTuple):
 
 
 def minimise(
-    P: Array, v: Array, rows: Array, low: Array, high: Array, start: Array, cost: float, tolerance: Tolerance = EXACT
+    P: Array, v: Array, rows: Array, low: Array, high: Array, cost: float, tolerance: Tolerance = EXACT
 ) -> Minimum:
-    """Return the minimiser of ``½ xᵀPx − vᵀx`` subject to ``low ≤ rows @ x ≤ high``.
+    """Return the minimiser of ``½ xᵀPx − vᵀx`` subject to ``low ≤ rows @ x ≤ high``, from 0.
 
     ``P``: (n, n): symmetric, positive definite; ``v``: (n,); ``rows``: (m, n): in units in which a bound is about 1;
-    ``low``, ``high``: (m,): ``low < high``; ``start``: (n,): initial iterate; ``cost``: scale of the cost, > 0, for
-    the tolerance.
+    ``low``, ``high``: (m,): ``low < high``; ``cost``: scale of the cost, > 0, for the tolerance.
     """
     # As B x ≥ b, with slacks s = B x − b > 0 and multipliers z > 0, s z → 0
     B, b = np.concatenate((rows, -rows)), np.concatenate((low, -high))
-    x, m = start.copy(), len(rows)
-    s, share = np.maximum(B @ x - b, _FIRST_SLACK), cost / len(b)
+    x, m = np.zeros(len(v)), len(rows)
+    s, share = np.maximum(-b, _FIRST_SLACK), cost / len(b)
     z, inner, beyond = tolerance.first_mu * share / s, None, tolerance.margin
     # Where active bounds hardly differ, rounding in rowsᵀ W rows would outgrow P. The first spline is never a wide one
     rho = _REGULARISATION * float(rows[:, 0] @ rows[:, 0] / np.max(np.diag(P)))
@@ -130,17 +129,14 @@ def _step_length(s: Array, ds: Array) -> float:
     return float(min(1.0, np.min(-s[shrinking] / ds[shrinking], initial=1.0)))
 
 
-def solve(
-    cost: PlanCost, bounds: Bounds, previous_plan: Array, n_pinned: int, *, tolerance: Tolerance = EXACT
-) -> Minimum | None:
-    """Return the minimiser of the cost within the bounds, as far as it is feasible from the last plan, and its steps.
+def solve(cost: PlanCost, bounds: Bounds, n_pinned: int = 0, *, tolerance: Tolerance = EXACT) -> Minimum | None:
+    """Return the change of least cost within the bounds, as far as it is feasible from none, and its steps.
 
-    The unconstrained minimiser if it is feasible. Otherwise the first ``n_pinned`` coefficients stay as they are in
-    ``previous_plan``: a real-time implementation solves for the others while the pinned ones act.
+    The unconstrained minimiser if it is feasible. Otherwise the first ``n_pinned`` coefficients, < n, do not change: a
+    real-time implementation solves for the others while the pinned ones act.
 
-    ``previous_plan``: (n,), m: feasible coefficients; ``n_pinned``: coefficients that a bounded plan does not change,
-    < n; ``tolerance``: of the interior-point solver, where the bounds are active. Returns Minimum or None: ``(n,)``, m;
-    None if there is no finite minimiser.
+    ``tolerance``: of the interior-point solver, where the bounds are active. Returns Minimum or None: ``(n,)``, m; None
+    if there is no finite minimiser.
     """
     try:
         c = np.asarray(cho_solve(cho_factor(cost.P), cost.v))
@@ -150,29 +146,27 @@ def solve(
         return None
     if bounds.allow(c):
         return Minimum(c, 0)
-    pinned = previous_plan[:n_pinned]
-    rows, taken = bounds.rows[:, n_pinned:], bounds.rows[:, :n_pinned] @ pinned
+    rows, pinned, nothing = bounds.rows[:, n_pinned:], np.zeros(n_pinned), np.zeros_like(c)
     touched = rows.any(axis=1)
     found = minimise(
         cost.P[n_pinned:, n_pinned:],
-        cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ pinned,
+        cost.v[n_pinned:],
         rows[touched],
-        (bounds.low - taken)[touched] + tolerance.margin,
-        (bounds.high - taken)[touched] - tolerance.margin,
-        previous_plan[n_pinned:],
-        float(cost.v @ c + previous_plan @ cost.P @ previous_plan),  # between the last plan and its minimiser
+        bounds.low[touched] + tolerance.margin,
+        bounds.high[touched] - tolerance.margin,
+        float(cost.v @ c),  # between no change and the minimiser
         tolerance,
     )
-    start = previous_plan if found.inner is None else np.concatenate((pinned, found.inner))
+    start = nothing if found.inner is None else np.concatenate((pinned, found.inner))
     best = np.concatenate((pinned, found.x))
     if not np.isfinite(best).all():
-        return found._replace(x=previous_plan)
+        return found._replace(x=nothing)
     # Bounds that are exceeded, as steps are limited, are so by little
     return found._replace(x=start + bounds.step(start, best) * (best - start))
 
 
 def solve_change(
-    cost: PlanCost, bounds: Bounds, previous_plan: Array, splines: Array, tolerance: Tolerance
+    cost: PlanCost, bounds: Bounds, previous_plan: Array, splines: Array, n_pinned: int, tolerance: Tolerance
 ) -> Array | None:
     """Return the plan of least cost within the bounds that changes ``previous_plan`` by sums of splines, ``(n, m)``.
 
@@ -180,5 +174,5 @@ def solve_change(
     :func:`solve`. Returns the coefficients, ``(3 + n,)``, m; None if there is no finite minimiser.
     """
     decided, last = np.split(previous_plan, [N_DECIDED])
-    found = solve(cost, bounds.of_change(last, splines), np.zeros(splines.shape[1]), 0, tolerance=tolerance)
+    found = solve(cost, bounds.of_change(last, splines), n_pinned, tolerance=tolerance)
     return None if found is None else np.concatenate((decided, last + splines @ found.x))

@@ -53,7 +53,7 @@ def solved_splines(n: int, window: int) -> Array:
 
 @dataclass(frozen=True)
 class PlanCost:
-    """Quadratic cost ``½ cᵀ P c − vᵀ c`` of a plan: half its sum of squares up to a constant."""
+    """Quadratic cost ``½ cᵀ P c − vᵀ c`` of a change of the last plan: half its sum of squares up to a constant."""
 
     P: Array  # (n, n)
     v: Array  # (n,), m
@@ -63,9 +63,9 @@ class PlanCost:
         self.P[np.diag_indices_from(self.P)] += _RIDGE * np.max(np.diag(self.P))
         return self
 
-    def of_change(self, plan: Array, splines: Array) -> "PlanCost":
-        """Return the cost of a change of a ``plan``, ``(n,)``, m, by sums of splines, ``(n, m)``."""
-        return PlanCost(splines.T @ self.P @ splines, splines.T @ (self.v - self.P @ plan))
+    def by(self, splines: Array) -> "PlanCost":
+        """Return the cost of a change by sums of splines, ``(n, m)``."""
+        return PlanCost(splines.T @ self.P @ splines, splines.T @ self.v)
 
 
 class SplineBasis:
@@ -104,27 +104,28 @@ class SplineBasis:
         g: Array,
         free: Array,
         x_d: Array,
-        decided: Array,
+        plan: Array,
         before: Array,
         jerk_weight: float,
         weight: Array | None = None,
     ) -> PlanCost:
-        """Return ``‖weight (x_d − G (x_d + δ) − free)‖² + jerk_weight·‖D³ δ‖²`` as a function of the free coefficients.
+        """Return ``‖weight (x_d − G (x_d + δ) − free)‖² + jerk_weight·‖D³ δ‖²`` as a function of a change of a plan.
 
         ``g``, ``free``: (preview,): first column of ``G``, and the free response, m; eq. (3); ``x_d``: (preview,), m:
-        commanded positions; ``decided``: (3,), m: decided coefficients; ``before``: (3,), m: last three values of δ;
+        commanded positions; ``plan``: (3 + n_free,), m: its coefficients, of which the decided ones do not change, as
+        the remainder of the last plan has them; ``before``: (3,), m: last three values of δ;
         ``jerk_weight``: weight of the third differences; ``weight``: (preview,): of the errors; all count alike
         without it.
         """
-        delta = self.values[:, :N_DECIDED] @ decided
-        # Eq. (3) with the decided part of δ: x_d − G (x_d + δ_decided) − free
+        delta = self.values @ plan
+        # Eq. (3): x_d − G (x_d + δ) − free
         target = x_d - free - np.asarray(lfilter(g, [1.0], x_d + delta))
-        third_decided = np.diff(np.concatenate((before, delta)), 3)
+        third = np.diff(np.concatenate((before, delta)), 3)
         W, D = self.filtered(g), self.third[:, N_DECIDED:]
         if weight is not None:
             W, target = weight[:, None] * W, weight * target
         P = W.T @ W + jerk_weight * (D.T @ D)
-        return PlanCost(P, W.T @ target - jerk_weight * (D.T @ third_decided))
+        return PlanCost(P, W.T @ target - jerk_weight * (D.T @ third))
 
 
 def _shifts(samples: Array, n: int, spacing: int) -> Array:

@@ -51,7 +51,7 @@ def test_splines_approach_the_direct_samples() -> None:
     excess, distance = [], []
     for spacing in (10, 5, 2, 1):
         basis = SplineBasis(200, spacing, 200)
-        cost = basis.cost(g, free, x_d, np.zeros(3), rest, weight)
+        cost = basis.cost(g, free, x_d, np.zeros(3 + basis.n_free), rest, weight)
         delta = basis.values[:, N_DECIDED:] @ np.linalg.solve(cost.P, cost.v)
         excess.append(tracking_cost(g, x_d, delta, weight) / least - 1.0)
         distance.append(float(np.max(np.abs((delta - direct)[:150])) / np.max(np.abs(direct))))
@@ -118,7 +118,7 @@ def at_the_limits(seed: int) -> tuple[PlanCost, Bounds, Array]:
     x_d = np.concatenate((np.zeros(30), path, np.full(preview, path[-1])))[:preview]
     rest, before = np.zeros(basis.values.shape[1]), np.zeros(3)
     free = np.cumsum(1e-6 * rng.normal(size=preview))
-    cost = basis.cost(g, free, x_d, before, before, 1.0).regular()
+    cost = basis.cost(g, free, x_d, rest, before, 1.0).regular()
     return cost, DriveBounds(basis, TS, PAPER_LIMITS, 1e-3).bounds(x_d, before, before, rest), rest[N_DECIDED:]
 
 
@@ -128,14 +128,14 @@ def test_few_steps_leave_a_plan_within_the_bounds(seed: int) -> None:
     """The remainder touches bounds: on the way from it a plan that exceeds one of them by a millionth would be none."""
     cost, bounds, rest = at_the_limits(seed)
     splines = np.eye(len(rest))[:, 4:]
-    of_change = cost.of_change(rest, splines)
+    of_change = cost.by(splines)
     P, v = of_change.P, of_change.v
     least = clarabel_minimum(P, v, bounds.rows @ splines, bounds.low, bounds.high)
 
     def above_least(c: Array) -> float:
         return float(0.5 * (c @ P @ c - least @ P @ least) - v @ (c - least))
 
-    found = solve(of_change, bounds.of_change(rest, splines), np.zeros(len(v)), 0, tolerance=TOLERANCE)
+    found = solve(of_change, bounds.of_change(rest, splines), tolerance=TOLERANCE)
     assert found is not None
     assert found.steps > 0  # bounds are active
     values = bounds.rows @ splines @ found.x
@@ -147,9 +147,9 @@ def test_few_steps_leave_a_plan_within_the_bounds(seed: int) -> None:
 def test_a_bounded_plan_costs_what_another_solver_finds(monkeypatch: pytest.MonkeyPatch) -> None:
     bounded = []
 
-    def compare(cost: PlanCost, bounds: Bounds, rest: Array, n_pinned: int, *, tolerance: Tolerance) -> Minimum | None:
+    def compare(cost: PlanCost, bounds: Bounds, n_pinned: int, *, tolerance: Tolerance) -> Minimum | None:
         assert tolerance == EXACT
-        found = solve(cost, bounds, rest, n_pinned)
+        found = solve(cost, bounds, n_pinned)
         assert found is not None
         c = found.x
         assert np.max(np.maximum(bounds.rows @ c - bounds.high, bounds.low - bounds.rows @ c)) <= 1e-12
@@ -157,11 +157,9 @@ def test_a_bounded_plan_costs_what_another_solver_finds(monkeypatch: pytest.Monk
         if bounds.allow(free):
             np.testing.assert_allclose(c, free, rtol=0, atol=1e-9)
             return found
-        np.testing.assert_allclose(c[:n_pinned], rest[:n_pinned], rtol=0, atol=1e-15)
-        P, rows = cost.P[n_pinned:, n_pinned:], bounds.rows[:, n_pinned:]
-        v = cost.v[n_pinned:] - cost.P[n_pinned:, :n_pinned] @ rest[:n_pinned]
-        taken = bounds.rows[:, :n_pinned] @ rest[:n_pinned]
-        other = clarabel_minimum(P, v, rows, bounds.low - taken, bounds.high - taken)
+        assert not c[:n_pinned].any()
+        P, v, rows = cost.P[n_pinned:, n_pinned:], cost.v[n_pinned:], bounds.rows[:, n_pinned:]
+        other = clarabel_minimum(P, v, rows, bounds.low, bounds.high)
 
         def value(x: Array) -> float:
             return float(0.5 * x @ P @ x - v @ x)
@@ -169,7 +167,7 @@ def test_a_bounded_plan_costs_what_another_solver_finds(monkeypatch: pytest.Monk
         bounded.append((value(c[n_pinned:]) - value(other)) / float(cost.v @ free))
         return found
 
-    monkeypatch.setattr("hybridsep.compensate.planning.solve", compare)
+    monkeypatch.setattr("hybridsep.compensate.qp.solve", compare)
     cosimulate(compensator(limits=PAPER_LIMITS), plant(), commanded()[:3500], encoder=Encoder(5e-6, 0))
     assert len(bounded) >= 15
     assert np.max(np.abs(bounded)) <= 1e-5

@@ -68,20 +68,19 @@ static hsep_newton_task compensator_task(hsep_compensator *self)
         .load = hsep_at(self, self->load)};
 }
 
-/* target := x_d - the model's response to x_d with the decided part of delta; eq. (3) without a matrix. */
+/* target := x_d - the model's response to x_d under the remainder of the last plan; eq. (3) without a matrix. */
 static void compensator_target(hsep_compensator *self, hsep_sep_state state)
 {
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     const hsep_planner *planner = hsep_compensator_planner(self);
     const hsep_int horizon = compensator_horizon(self), Np = predictor->Np;
-    const hsep_real *x_d = hsep_at(predictor, predictor->x_d), *c = hsep_at_const(planner, planner->c);
-    const hsep_real *load = hsep_at(self, self->load);
+    const hsep_real *x_d = hsep_at(predictor, predictor->x_d), *load = hsep_at(self, self->load);
     hsep_real *target = hsep_at(self, self->target);
     hsep_real *x = hsep_at(self, self->trial_x), *e = hsep_at(self, self->trial_e);
     hsep_physics *trial = compensator_trial(self);
     for (hsep_int k = 0; k < horizon; k++) {
-        const hsep_real decided = hsep_splines_sum(hsep_planner_splines(planner), c, HSEP_N_DECIDED, k);
-        x[horizon - 1 - k] = hsep_physics_respond(trial, x_d[k] - predictor->start + decided + load[k]);
+        const hsep_real command = x_d[k] - predictor->start + hsep_planner_delta(planner, k) + load[k];
+        x[horizon - 1 - k] = hsep_physics_respond(trial, command);
         target[k] = x_d[k] - predictor->start - x[horizon - 1 - k];
     }
     if (state == HSEP_SEP_HYBRID) {
@@ -209,9 +208,10 @@ static hsep_plan_status compensator_try(hsep_compensator *self, hsep_sep_state s
     compensator_target(self, state);
     const hsep_real *spline =
         state == HSEP_SEP_HYBRID ? compensator_filter_spline(self) : hsep_at(self, self->spline_pb);
-    hsep_planner_open(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d), 0, 1.0);
-    hsep_planner_aim(hsep_compensator_planner(self), spline, hsep_at(self, self->target));
-    const hsep_plan_status status = hsep_planner_solve(hsep_compensator_planner(self), HSEP_QP_STEPS);
+    hsep_planner *planner = hsep_compensator_planner(self);
+    hsep_planner_open(planner, hsep_at(predictor, predictor->x_d), 0, 1.0);
+    hsep_planner_aim(planner, spline, hsep_at(self, self->target), planner->jerk_weight);
+    const hsep_plan_status status = hsep_planner_solve(planner, HSEP_QP_STEPS);
     self->state = (hsep_int)(status == HSEP_PLAN_FAILED ? HSEP_SEP_OFF : state);
     return status;
 }

@@ -34,47 +34,46 @@ typedef struct {
 } hsep_interior;
 HSEP_ASSERT_WORDS(hsep_interior, 21);
 
-/* Where the problem goes before hsep_interior_begin; of v, x and inner the first m entries count. */
+/* The problem, of which v, low and high are set before hsep_interior_begin, and the arrays of the solver; of the first
+ * three the first n entries count. Slacks and multipliers are of the bounds B x >= b, of the low rows, then of the high
+ * ones, as qp.py has them: B = [A; -A], b = [low; -high]. A proximal term rho regularises the multipliers:
+ * ds = B dx + r_p + rho dz, z ds + s dz = r_c (s + rho z). */
 typedef struct {
-    hsep_real *v;          /* (n,) m */
-    hsep_real *x;          /* (n,) m, start and result */
-    hsep_real *inner;      /* (n,) m, result: the iterate farthest inside the bounds without their margin, or NULL */
-    hsep_real *low, *high; /* (4 preview,), in shares */
-    hsep_real *c;          /* (n + 2 HSEP_KNOTS_NEAR,) work, before and behind it, */
-    hsep_real *products;   /* (n, HSEP_KNOTS_WIDTH) for products of splines, */
-    hsep_real *factor;     /* and for a triangle of n rows */
-} hsep_problem;
-
-/* Slacks and multipliers of the bounds B x >= b, of the low rows, then of the high ones, as qp.py has them:
- * B = [A; -A], b = [low; -high]. A proximal term rho regularises the multipliers: ds = B dx + r_p + rho dz,
- * z ds + s dz = r_c (s + rho z). */
-typedef struct {
-    hsep_real rho;          /* 1/m2, proximal regularisation of the multipliers */
-    hsep_int n;             /* bounds, an even number */
-    hsep_real *rows, *work; /* (4 preview,) low and high before the beginning; then rows of x or dx, or for A' */
-    hsep_real *b, *s, *z;   /* (n,) shares; slack s = B x - b and multiplier z, m2, both > 0 */
-    hsep_real *inverse;     /* (n,) 1 / (s + rho z) */
-    hsep_real *r_c, *r_p;   /* (n,) complementarity that a step aims at, times inverse; primal residual B x - b - s */
-    hsep_real *ds, *dz;     /* (n,) B x or B dx, then the step of s; the step of z */
+    const hsep_splines *splines;
+    const hsep_knots *knots;
+    hsep_int first;        /* spline that is not fixed */
+    hsep_int n, m;         /* entries of x, as many as there are knots; bounds, an even number */
+    hsep_real *v, *x;      /* m; m, result, from 0 */
+    hsep_real *inner;      /* m, the iterate farthest inside the bounds without their margin, if one is */
+    hsep_real *r_d, *dx;   /* (n,) dual residual v - P x + B' z, and step */
+    hsep_real *low, *high; /* (4 preview,) in shares, before the beginning; then rows of x or dx, or for A', and work */
+    hsep_real *b, *s, *z;  /* (m,) shares; slack s = B x - b and multiplier z, m2, both > 0 */
+    hsep_real *inverse;    /* (m,) 1 / (s + rho z) */
+    hsep_real *r_c, *r_p;  /* (m,) complementarity that a step aims at, times inverse; primal residual B x - b - s */
+    hsep_real *ds, *dz;    /* (m,) B x or B dx, then the step of s; the step of z */
+    hsep_real *factor;     /* triangle of n rows; work, as are the next ones outside of a step: */
+    hsep_real *c;          /* (all + 2 HSEP_KNOTS_NEAR,), all splines, */
+    hsep_real *products;   /* (all, HSEP_KNOTS_WIDTH) products of splines */
+    hsep_real rho;         /* 1/m2, proximal regularisation of the multipliers */
     struct {
         hsep_int begin, count;
     } range[HSEP_ORDERS]; /* the rows of an order that x touches */
-} slacks;
+} hsep_problem;
 
 /* Lengths of a step, 0 ... 1. */
 typedef struct {
     hsep_real primal, dual;
-} slacks_step_lengths;
+} interior_lengths;
 
 /* The vector of an array of the slacks `it` at bound r. */
 #define AT(array) (*hsep_lanes_at(it.array + r))
 
 /* to := [low; -high] of rows, which are B x where both are A x. */
-static void slacks_take_rows(const slacks *self, const hsep_real *low, const hsep_real *high, hsep_real *to)
+static void interior_take_rows(hsep_problem it, const hsep_real *low, const hsep_real *high, hsep_real *to)
 {
-    hsep_real *second = to + self->n / 2;
+    hsep_real *second = to + it.m / 2;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        const hsep_int begin = self->range[order].begin, count = self->range[order].count;
+        const hsep_int begin = it.range[order].begin, count = it.range[order].count;
         hsep_copy(to, low + begin, count);
         for (hsep_int r = 0; r < count; r++) {
             second[r] = -high[begin + r];
@@ -84,12 +83,12 @@ static void slacks_take_rows(const slacks *self, const hsep_real *low, const hse
 }
 
 /* Rows := y of the low bounds + sign y of the high ones. */
-static void slacks_give_rows(const slacks *self, const hsep_real *y, hsep_real sign)
+static void interior_give_rows(hsep_problem it, const hsep_real *y, hsep_real sign)
 {
-    const hsep_real *high = y + self->n / 2;
+    const hsep_real *high = y + it.m / 2;
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        hsep_real *rows = self->rows + self->range[order].begin;
-        const hsep_int count = self->range[order].count;
+        hsep_real *rows = it.low + it.range[order].begin;
+        const hsep_int count = it.range[order].count;
         hsep_copy(rows, y, count);
         hsep_axpy(rows, sign, high, count);
         y += count, high += count;
@@ -98,12 +97,11 @@ static void slacks_give_rows(const slacks *self, const hsep_real *y, hsep_real s
 
 /* Steps of B dx in ds, ds = B dx + r_p + rho dz and dz = r_c - z (B dx + r_p) / (s + rho z), and their lengths to where
  * all values + length change stay >= 0: the largest -change / value is its inverse. */
-static slacks_step_lengths slacks_lengths(const slacks *self)
+static interior_lengths interior_step(hsep_problem it)
 {
-    const slacks it = *self;
     const hsep_real rho = it.rho;
     hsep_lanes primal = {0.0}, dual = primal;
-    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+    for (hsep_int r = 0; r < it.m; r += HSEP_LANES) {
         const hsep_lanes z = AT(z), to = AT(ds) + AT(r_p), dz = AT(r_c) - z * AT(inverse) * to, ds = to + rho * dz;
         AT(dz) = dz;
         AT(ds) = ds;
@@ -111,30 +109,28 @@ static slacks_step_lengths slacks_lengths(const slacks *self)
         dual = hsep_larger(-dz / z, dual);
     }
     const hsep_real of_s = hsep_largest(primal), of_z = hsep_largest(dual);
-    return (slacks_step_lengths){.primal = of_s > 1.0 ? 1.0 / of_s : 1.0, .dual = of_z > 1.0 ? 1.0 / of_z : 1.0};
+    return (interior_lengths){.primal = of_s > 1.0 ? 1.0 / of_s : 1.0, .dual = of_z > 1.0 ? 1.0 / of_z : 1.0};
 }
 
 /* mu after the predictor's step, as far as s and z stay >= 0. */
-static hsep_real slacks_predicted(const slacks *self)
+static hsep_real interior_predicted(hsep_problem it)
 {
-    const slacks_step_lengths alpha = slacks_lengths(self);
-    const slacks it = *self;
+    const interior_lengths alpha = interior_step(it);
     hsep_real sums[2] = {0.0, 0.0}; /* two side by side, whatever a vector holds */
-    for (hsep_int r = 0; r < it.n; r++) {
+    for (hsep_int r = 0; r < it.m; r++) {
         sums[r % 2] += (it.s[r] + alpha.primal * it.ds[r]) * (it.z[r] + alpha.dual * it.dz[r]);
     }
-    return (sums[0] + sums[1]) / (hsep_real)it.n;
+    return (sums[0] + sums[1]) / (hsep_real)it.m;
 }
 
 /* Go by the corrector's step, as far as s and z stay > 0; return the primal length. */
-static hsep_real slacks_move(const slacks *self)
+static hsep_real interior_move(hsep_problem it)
 {
-    const slacks_step_lengths alpha = slacks_lengths(self);
+    const interior_lengths alpha = interior_step(it);
     const hsep_real primal = alpha.primal >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha.primal;
     const hsep_real dual = alpha.dual >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha.dual;
-    const slacks it = *self;
     const hsep_real rho = it.rho;
-    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+    for (hsep_int r = 0; r < it.m; r += HSEP_LANES) {
         const hsep_lanes s = AT(s) + primal * AT(ds), z = AT(z) + dual * AT(dz);
         AT(s) = s;
         AT(z) = z;
@@ -143,140 +139,106 @@ static hsep_real slacks_move(const slacks *self)
     return primal;
 }
 
-/* The arrays after the struct. */
-typedef struct {
-    const hsep_splines *splines;
-    const hsep_knots *knots;
-    hsep_int first, n; /* the first spline that is not fixed; entries of x, as many as there are knots */
-    hsep_problem problem;
-    hsep_real *r_d, *dx; /* (n,) dual residual v - P x + B' z, and step */
-    slacks slacks;
-} interior_arrays;
-
-/* Take count numbers of a block; NULL if there is no block but only its size is asked for. */
-static hsep_real *interior_take(hsep_real *block, hsep_real *end, hsep_real count)
+/* Walk the arrays of n splines; return the bytes of the block. block: NULL where only its size is asked for. */
+static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n, hsep_problem *it)
 {
-    const hsep_int offset = hsep_take(end, count);
-    return block != NULL ? block + offset : NULL;
-}
-
-/* Walk the arrays of n splines; return the bytes of the block. */
-static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n, interior_arrays *a)
-{
-    const hsep_real columns = (hsep_real)n, rows = HSEP_ORDERS * (hsep_real)preview;
+    const hsep_real columns = (hsep_real)n, rows = HSEP_ORDERS * (hsep_real)preview, work = rows + 4 * HSEP_LANES_MOST;
+    const hsep_real others[] = {
+        rows, work, hsep_triangle(n), columns + 2.0 * HSEP_KNOTS_NEAR, HSEP_KNOTS_WIDTH * columns};
+    hsep_real **const arrays[] = {&it->x,  &it->v,   &it->inner,   &it->r_d,    &it->dx,  &it->b,
+                                  &it->s,  &it->z,   &it->inverse, &it->r_c,    &it->r_p, &it->ds,
+                                  &it->dz, &it->low, &it->high,    &it->factor, &it->c,   &it->products};
     hsep_real end = HSEP_WORDS(hsep_interior);
-    hsep_real **const of_columns[5] = {&a->problem.x, &a->problem.v, &a->problem.inner, &a->r_d, &a->dx};
-    for (int i = 0; i < 5; i++) {
-        *of_columns[i] = interior_take(block, &end, columns);
+    for (int i = 0; i < 18; i++) {
+        const hsep_int offset = hsep_take(&end, i < 5 ? columns : i < 13 ? 2.0 * rows : others[i - 13]);
+        *arrays[i] = block != NULL ? block + offset : NULL;
     }
-    slacks *bounds = &a->slacks;
-    a->problem.low = bounds->rows = interior_take(block, &end, rows);
-    a->problem.high = bounds->work = interior_take(block, &end, rows + 4 * HSEP_LANES_MOST);
-    hsep_real **const of_bounds[8] = {&bounds->b,   &bounds->s,   &bounds->z,  &bounds->inverse,
-                                      &bounds->r_c, &bounds->r_p, &bounds->ds, &bounds->dz};
-    for (int i = 0; i < 8; i++) {
-        *of_bounds[i] = interior_take(block, &end, 2.0 * rows);
-    }
-    a->problem.factor = interior_take(block, &end, hsep_triangle(n));
-    a->problem.c = interior_take(block, &end, columns + 2.0 * HSEP_KNOTS_NEAR);
-    a->problem.products = interior_take(block, &end, HSEP_KNOTS_WIDTH * columns);
     return end * sizeof(hsep_real);
 }
 
 /* bytes of the block, counted as a number */
 static hsep_real hsep_interior_size(hsep_int preview, hsep_int n)
 {
-    interior_arrays arrays;
+    hsep_problem arrays;
     return interior_lay_out(NULL, preview, n, &arrays);
-}
-
-static interior_arrays interior_open(hsep_interior *self, const hsep_splines *splines)
-{
-    interior_arrays a;
-    (void)interior_lay_out((hsep_real *)self, splines->preview, splines->n, &a);
-    a.splines = splines;
-    a.knots = &self->knots;
-    a.first = splines->n - self->knots.n;
-    a.n = self->knots.m;
-    a.slacks.rho = self->rho;
-    a.slacks.n = 0;
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        const hsep_int begin = a.first * splines->spacing + 1; /* a spline begins with 0 */
-        a.slacks.range[order].begin = begin + order * splines->preview;
-        a.slacks.range[order].count = (a.first + a.knots->end + 3) * splines->spacing + order - begin;
-        a.slacks.n += 2 * a.slacks.range[order].count;
-    }
-    return a;
-}
-
-/* B of x or dx, (n,), to ds. */
-static void interior_rows(const interior_arrays *a, const hsep_real x[])
-{
-    hsep_knots_widen(a->knots, x, a->problem.c);
-    hsep_splines_rows(a->splines, a->problem.c, a->first, a->slacks.rows);
-    slacks_take_rows(&a->slacks, a->slacks.rows, a->slacks.rows, a->slacks.ds);
-}
-
-/* g, (n,), += A' of the rows. */
-static void interior_transpose(const interior_arrays *a, hsep_real g[])
-{
-    hsep_zero(a->problem.c, a->knots->n);
-    hsep_splines_transpose(a->splines, a->slacks.rows, a->first, a->problem.c);
-    hsep_knots_narrow(a->knots, a->problem.c, g);
 }
 
 static hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines)
 {
-    hsep_problem problem = interior_open(self, splines).problem;
-    problem.inner = self->beyond < self->tolerance.margin ? problem.inner : NULL;
-    return problem;
+    hsep_problem it = {
+        .splines = splines,
+        .knots = &self->knots,
+        .first = splines->n - self->knots.n,
+        .n = self->knots.m,
+        .rho = self->rho};
+    (void)interior_lay_out((hsep_real *)self, splines->preview, splines->n, &it);
+    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+        const hsep_int begin = it.first * splines->spacing + 1; /* a spline begins with 0 */
+        it.range[order].begin = begin + order * splines->preview;
+        it.range[order].count = (it.first + it.knots->end + 3) * splines->spacing + order - begin;
+        it.m += 2 * it.range[order].count;
+    }
+    return it;
+}
+
+/* B of x or dx, (n,), to ds. */
+static void interior_rows(hsep_problem it, const hsep_real x[])
+{
+    hsep_knots_widen(it.knots, x, it.c);
+    hsep_splines_rows(it.splines, it.c, it.first, it.low);
+    interior_take_rows(it, it.low, it.low, it.ds);
+}
+
+/* g, (n,), += A' of the rows. */
+static void interior_transpose(hsep_problem it, hsep_real g[])
+{
+    hsep_zero(it.c, it.knots->n);
+    hsep_splines_transpose(it.splines, it.low, it.first, it.c);
+    hsep_knots_narrow(it.knots, it.c, g);
 }
 
 /* r_d := v - P x + B' z; return its largest entry as a share of the largest one of its terms. */
-static hsep_real interior_dual_residual(const interior_arrays *a, const hsep_real *P)
+static hsep_real interior_dual_residual(hsep_problem it, const hsep_real *P)
 {
     hsep_real residual = 0.0, largest = 0.0;
-    hsep_copy(a->r_d, a->problem.v, a->n);
-    for (hsep_int i = 0; i < a->n; i++) { /* v - P x */
-        const hsep_int left = a->n - i - 1;
-        a->r_d[i] -= hsep_dot(P, a->problem.x + i, left + 1);
-        hsep_axpy(a->r_d + i + 1, -a->problem.x[i], P + 1, left);
+    hsep_copy(it.r_d, it.v, it.n);
+    for (hsep_int i = 0; i < it.n; i++) { /* v - P x */
+        const hsep_int left = it.n - i - 1;
+        it.r_d[i] -= hsep_dot(P, it.x + i, left + 1);
+        hsep_axpy(it.r_d + i + 1, -it.x[i], P + 1, left);
         P += left + 1;
     }
-    hsep_zero(a->dx, a->n);
-    slacks_give_rows(&a->slacks, a->slacks.z, -1.0);
-    interior_transpose(a, a->dx);
-    for (hsep_int j = 0; j < a->n; j++) {
+    hsep_zero(it.dx, it.n);
+    interior_give_rows(it, it.z, -1.0);
+    interior_transpose(it, it.dx);
+    for (hsep_int j = 0; j < it.n; j++) {
         largest = hsep_fmax(
-            hsep_fmax(largest, hsep_fabs(a->problem.v[j])),
-            hsep_fmax(hsep_fabs(a->problem.v[j] - a->r_d[j]), hsep_fabs(a->dx[j])));
-        a->r_d[j] += a->dx[j];
-        residual = hsep_fmax(residual, hsep_fabs(a->r_d[j]));
+            hsep_fmax(largest, hsep_fabs(it.v[j])), hsep_fmax(hsep_fabs(it.v[j] - it.r_d[j]), hsep_fabs(it.dx[j])));
+        it.r_d[j] += it.dx[j];
+        residual = hsep_fmax(residual, hsep_fabs(it.r_d[j]));
     }
     return residual / largest;
 }
 
 /* dx := (P + A' W A)^-1 (r_d + B' (r_c - z r_p / (s + rho z))), and B dx. */
-static void interior_direction(const interior_arrays *a)
+static void interior_direction(hsep_problem it)
 {
-    const slacks it = a->slacks;
-    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+    for (hsep_int r = 0; r < it.m; r += HSEP_LANES) {
         AT(ds) = AT(r_c) - AT(z) * AT(inverse) * AT(r_p);
     }
-    slacks_give_rows(&it, it.ds, -1.0);
-    hsep_copy(a->dx, a->r_d, a->n);
-    interior_transpose(a, a->dx);
-    hsep_cholesky_solve(a->problem.factor, a->n, a->dx);
-    interior_rows(a, a->dx);
+    interior_give_rows(it, it.ds, -1.0);
+    hsep_copy(it.dx, it.r_d, it.n);
+    interior_transpose(it, it.dx);
+    hsep_cholesky_solve(it.factor, it.n, it.dx);
+    interior_rows(it, it.dx);
 }
 
 /* The residuals at x, and whether it is the solution; the predictor's r_c, as if s z = 0 could be reached at once. */
-static void interior_residuals(hsep_interior *self, const interior_arrays *a, const hsep_real P[])
+static void interior_residuals(hsep_interior *self, hsep_problem it, const hsep_real P[])
 {
-    const slacks it = a->slacks;
     hsep_lanes largest = {0.0}, outside = largest - HSEP_HUGE(1e300);
-    interior_rows(a, a->problem.x);
-    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) {
+    interior_rows(it, it.x);
+    for (hsep_int r = 0; r < it.m; r += HSEP_LANES) {
         const hsep_lanes s = AT(s), distance = AT(ds) - AT(b), r_p = distance - s;
         AT(r_p) = r_p;
         AT(r_c) = -(s * AT(z) * AT(inverse));
@@ -286,15 +248,15 @@ static void interior_residuals(hsep_interior *self, const interior_arrays *a, co
     const hsep_real beyond = hsep_largest(outside); /* negative inside all bounds */
     if (beyond < self->beyond) {
         self->beyond = beyond;
-        hsep_copy(a->problem.inner, a->problem.x, a->n);
+        hsep_copy(it.inner, it.x, it.n);
     }
-    const hsep_real mu = self->mu = hsep_dot(it.s, it.z, it.n) / (hsep_real)it.n, r_d = interior_dual_residual(a, P);
+    const hsep_real mu = self->mu = hsep_dot(it.s, it.z, it.m) / (hsep_real)it.m, r_d = interior_dual_residual(it, P);
     self->solved = self->steps == self->tolerance.steps || mu == 0.0 || /* it underflows */
                    (mu < self->tolerance.mu * self->cost && hsep_largest(largest) < self->tolerance.margin &&
                     r_d < self->tolerance.dual_residual);
 }
 
-/* Begin with x and the bounds as they are. knots: of the last splines; P: a triangle of m rows; cost: its scale, m2. */
+/* Begin with the bounds as they are, from 0. knots: of the last splines; P: a triangle of m rows; cost: its scale, m2. */
 static void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_knots *knots, const hsep_real P[], hsep_real cost,
     const hsep_tolerance *tolerance)
@@ -302,64 +264,61 @@ static void hsep_interior_begin(
     self->knots = *knots;
     self->tolerance = *tolerance;
     self->steps = self->half = 0;
-    interior_arrays a = interior_open(self, splines);
-    self->cost = cost / (hsep_real)a.slacks.n;
+    hsep_problem it = hsep_interior_problem(self, splines);
+    self->cost = cost / (hsep_real)it.m;
     self->beyond = tolerance->margin;
     /* The proximal term bounds A' W A by P / HSEP_QP_REGULARISATION: where active bounds hardly differ, rounding in it
      * would outgrow P. That of a uniform spline: wide ones have up to four times as much. */
     hsep_real largest = 0.0;
-    for (hsep_int i = 0, diagonal = 0; i < a.n; diagonal += a.n - i++) {
+    for (hsep_int i = 0, diagonal = 0; i < it.n; diagonal += it.n - i++) {
         largest = hsep_fmax(largest, P[diagonal]);
     }
-    a.slacks.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
-    slacks_take_rows(&a.slacks, a.slacks.rows, a.slacks.work, a.slacks.b);
-    interior_rows(&a, a.problem.x);
-    const slacks it = a.slacks;
-    for (hsep_int r = 0; r < it.n; r++) {
-        it.s[r] = hsep_fmax(it.ds[r] - it.b[r], HSEP_QP_FIRST_SLACK);
+    it.rho = self->rho = HSEP_QP_REGULARISATION * hsep_splines_energy(splines) / largest;
+    interior_take_rows(it, it.low, it.high, it.b);
+    hsep_zero(it.x, it.n);
+    for (hsep_int r = 0; r < it.m; r++) {
+        it.s[r] = hsep_fmax(-it.b[r], HSEP_QP_FIRST_SLACK);
         it.z[r] = self->tolerance.first_mu * self->cost / it.s[r];
         it.inverse[r] = 1.0 / (it.s[r] + it.rho * it.z[r]);
     }
-    interior_residuals(self, &a, P);
+    interior_residuals(self, it, P);
 }
 
 /* The factor of P + A' W A, in place of P; return whether there is none. */
-static int interior_factor(const interior_arrays *a, const hsep_real P[])
+static int interior_factor(hsep_problem it, const hsep_real P[])
 {
-    const slacks it = a->slacks;
-    hsep_copy(a->problem.factor, P, (hsep_int)hsep_triangle(a->n));
-    for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* the weights W */
+    hsep_copy(it.factor, P, (hsep_int)hsep_triangle(it.n));
+    for (hsep_int r = 0; r < it.m; r += HSEP_LANES) { /* the weights W */
         AT(ds) = AT(z) * AT(inverse);
     }
-    slacks_give_rows(&it, it.ds, 1.0);
-    hsep_splines_gram(a->splines, a->slacks.rows, a->first, a->problem.products, a->slacks.work);
-    hsep_knots_add(a->knots, a->problem.products, a->problem.factor, a->problem.c);
-    return !hsep_cholesky_rows(a->problem.factor, a->n, 0, a->n, NULL);
+    interior_give_rows(it, it.ds, 1.0);
+    hsep_splines_gram(it.splines, it.low, it.first, it.products, it.high);
+    hsep_knots_add(it.knots, it.products, it.factor, it.c);
+    return !hsep_cholesky_rows(it.factor, it.n, 0, it.n, NULL);
 }
 
 /* Do half a step: its factor and its predictor, or its corrector and the residuals at its end. P: as in
  * hsep_interior_begin. Returns whether the plan is solved. */
 static int hsep_interior_advance(hsep_interior *self, const hsep_splines *splines, const hsep_real P[])
 {
-    const interior_arrays a = interior_open(self, splines);
-    const slacks it = a.slacks;
+    const hsep_problem it = hsep_interior_problem(self, splines);
     self->half = !self->half;
     if (self->half) { /* Newton: P dx - B' dz = r_d,  ds = B dx + r_p + rho dz,  z ds + s dz = r_c (s + rho z) */
-        if (self->solved || interior_factor(&a, P)) {
+        if (self->solved || interior_factor(it, P)) {
             return 1;
         }
-        interior_direction(&a);
-        const hsep_real mu = self->mu, ratio = slacks_predicted(&it) / mu; /* mu_aff / mu; sigma = ratio^3 */
+        interior_direction(it);
+        const hsep_real mu = self->mu, ratio = interior_predicted(it) / mu; /* mu_aff / mu; sigma = ratio^3 */
         const hsep_real centre = hsep_fmax(mu * ratio * ratio * ratio, 0.1 * self->tolerance.mu * self->cost);
-        for (hsep_int r = 0; r < it.n; r += HSEP_LANES) { /* with the curvature ds dz that the predictor shows */
+        for (hsep_int r = 0; r < it.m; r += HSEP_LANES) { /* with the curvature ds dz that the predictor shows */
             AT(r_c) = (centre - AT(s) * AT(z) - AT(ds) * AT(dz)) * AT(inverse);
         }
         return 0;
     }
-    interior_direction(&a);
-    hsep_axpy(a.problem.x, slacks_move(&it), a.dx, a.n);
+    interior_direction(it);
+    hsep_axpy(it.x, interior_move(it), it.dx, it.n);
     self->steps++;
-    interior_residuals(self, &a, P);
+    interior_residuals(self, it, P);
     return (int)self->solved;
 }
 

@@ -330,9 +330,10 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
-/* What parts of a plan count as: some variances, or columns abreast by an expert; variances that are apart, which take
- * more samples; what passes through the model or the solver once, for all samples of a plan; and half a prediction of a
+/* What parts of a plan count as: columns abreast by an expert; some variances, or those that are apart, which take more
+ * samples; what passes through the model or the solver once, for all samples of a plan; and half a prediction of a
  * plan, or the slopes under it. */
+#define NEWTON_COLUMNS 3
 #define NEWTON_SOME 4
 #define NEWTON_APART 6
 #define NEWTON_PASS 8
@@ -353,7 +354,7 @@ static hsep_int newton_of_solution(const hsep_newton *self, hsep_int halves)
 /* and columns abreast from one on. */
 static hsep_int newton_of_columns(hsep_newton *self, const hsep_newton_task *task, hsep_int first)
 {
-    const hsep_int full = NEWTON_SOME * (1 + hsep_linearised_experts(task->model)) / 2;
+    const hsep_int full = NEWTON_COLUMNS * hsep_linearised_experts(task->model);
     const int begins = first == hsep_knots_at(&task->planner->knots, first).first;
     return newton_parts(full * (self->preview - newton_begins(self)[first]), self->preview) + (begins ? NEWTON_SOME : 0);
 }

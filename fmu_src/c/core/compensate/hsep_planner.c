@@ -195,7 +195,6 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], int m
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int count = HSEP_N_DECIDED + splines->n, preview = splines->preview;
     hsep_real *total = hsep_at(self, self->total), *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
-    self->changes = 1;
     self->solved = self->knots;
     planner_limits(self, x_d, count, preview, change, total, low, high);
     (void)planner_third(self, hsep_at(self, self->c), count, hsep_at(self, self->third));
@@ -276,88 +275,62 @@ HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)
     }
 }
 
-HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[])
+HSEP_API void hsep_planner_aim(
+    hsep_planner *self, const hsep_real filtered[], const hsep_real target[], hsep_real jerk_weight)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_real *v = hsep_planner_linear(self);
-    self->changes = 0;
     self->solved = hsep_knots_of(splines->n, 0);
-    (void)planner_third(self, hsep_at(self, self->c), HSEP_N_DECIDED, hsep_at(self, self->third));
     for (hsep_int j = 0; j < splines->n; j++) { /* W' target */
         const hsep_int begin = j * splines->spacing;
         v[j] = hsep_dot(filtered, target + begin, splines->preview - begin);
     }
-    hsep_splines_filtered_gram(splines, filtered, hsep_at(self, self->P));
-    hsep_planner_complete(self, self->jerk_weight);
+    hsep_splines_filtered_gram(splines, filtered, hsep_planner_quadratic(self));
+    hsep_planner_complete(self, jerk_weight);
 }
 
-/* Reduce the cost to the splines that are not pinned: v := v_2 - P_21 pinned. */
+/* Reduce the cost to the splines that are not pinned. */
 static void planner_pin(hsep_planner *self)
 {
-    const hsep_int n = hsep_planner_splines(self)->n, first = self->n_pinned;
-    const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED, *P = hsep_planner_quadratic(self);
-    hsep_real *v = hsep_planner_linear(self);
-    self->solved = hsep_knots_of(n - first, 0);
-    for (hsep_int i = 0; i < first; i++) {
-        hsep_axpy(v + first, -rest[i], P + (first - i), n - first);
-        P += n - i;
+    const hsep_int n = self->solved.n, left = self->knots.n;
+    hsep_real *v = hsep_planner_linear(self), *P = hsep_planner_quadratic(self);
+    if (n > left) {
+        self->solved = hsep_knots_of(left, 0);
+        hsep_copy(v, v + (n - left), left);
+        hsep_copy(P, P + (hsep_int)(hsep_triangle(n) - hsep_triangle(left)), (hsep_int)hsep_triangle(left));
     }
-    hsep_copy(v, v + first, n - first);
-    hsep_copy(hsep_planner_quadratic(self), P, (hsep_int)hsep_triangle(n - first));
 }
 
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_problem problem = planner_problem(self);
-    const hsep_real *b = hsep_splines_shape(splines);
-    const hsep_int spacing = splines->spacing, width = 4 * spacing, first = self->n_pinned, n = splines->n - first;
-    hsep_real *P = hsep_planner_quadratic(self), *delta = problem.low;
+    const hsep_int preview = splines->preview, unknown = self->Np / splines->spacing, n = self->knots.n;
+    hsep_real *spline = planner_problem(self).low, *target = spline + preview;
     hsep_planner_open(self, x_d, 0, 1.0);
-    self->solved = hsep_knots_of(n, 0);
-    for (hsep_int k = 0; k < splines->preview; k++) {
-        delta[k] = hsep_planner_delta(self, k);
+    hsep_zero(spline, preview);
+    hsep_copy(spline, hsep_splines_shape(splines), 4 * splines->spacing);
+    for (hsep_int k = 0; k < preview; k++) {
+        target[k] = -hsep_planner_delta(self, k);
     }
-    for (hsep_int i = 0; i < n; i++) { /* products of splines, and of each with what there is */
-        for (hsep_int d = 0; d < n - i; d++) {
-            *P++ = d < 4 ? hsep_dot(b, b + d * spacing, width - d * spacing) : 0.0;
-        }
-        problem.v[i] = -hsep_dot(b, delta + (first + i) * spacing, width);
-    }
-    const hsep_real gain = 2.0 * hsep_sin(0.5 * HSEP_TWO_PI * HSEP_PLANNING_ENDS / (hsep_real)splines->preview);
-    hsep_planner_complete(self, hsep_pow(gain, -6.0)); /* gain of a difference at that period */
-    const hsep_int unknown = self->Np / spacing;
+    const hsep_real gain = 2.0 * hsep_sin(0.5 * HSEP_TWO_PI * HSEP_PLANNING_ENDS / (hsep_real)preview);
+    hsep_planner_aim(self, spline, target, hsep_pow(gain, -6.0)); /* gain of a difference at that period */
+    planner_pin(self);
     for (hsep_int i = n > unknown ? n - unknown : 0; i < n; i++) {
         hsep_planner_quadratic(self)[i * n - i * (i - 1) / 2] *= HSEP_PLANNING_NEW;
     }
 }
 
-/* The remainder of the last plan as this cost counts, (m,), m: no change of it, or what it is. */
-static void planner_start(hsep_planner *self, hsep_real x[])
-{
-    const hsep_real *rest = hsep_at(self, self->c) + HSEP_N_DECIDED + planner_first(self);
-    for (hsep_int j = 0; j < self->solved.m; j++) {
-        x[j] = self->changes ? 0.0 : rest[j];
-    }
-}
-
-/* Begin a bounded plan at this cost, from the remainder of the last plan. The pinned samples stay as they are, and its
- * bounds are what they leave. cost: as hsep_interior_begin has it. */
+/* Begin a bounded plan at this cost, from the remainder of the last plan. cost: as hsep_interior_begin has it. */
 static void planner_bound(hsep_planner *self, hsep_real cost, hsep_int steps)
 {
     hsep_tolerance tolerance = planner_tolerance(self->averaging);
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int preview = splines->preview;
     const hsep_real *total = hsep_at(self, self->total);
     const hsep_real *least = hsep_at(self, self->low), *most = hsep_at(self, self->high);
     const hsep_problem problem = planner_problem(self);
-    hsep_real *low = problem.low, *high = problem.high;
-    planner_start(self, problem.x);
-    planner_rows(self, problem.x, low);
-    for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
-        const hsep_real other = total[r] - low[r];
-        low[r] = least[r] - other + tolerance.margin;
-        high[r] = most[r] - other - tolerance.margin;
+    for (hsep_int r = 0; r < HSEP_ORDERS * splines->preview; r++) {
+        problem.low[r] = least[r] - total[r] + tolerance.margin;
+        problem.high[r] = most[r] - total[r] - tolerance.margin;
     }
     tolerance.steps = steps;
     hsep_interior_begin(
@@ -375,41 +348,27 @@ static void planner_take(hsep_planner *self, const hsep_real x[])
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
 {
     const hsep_int n = self->solved.m;
-    const hsep_real *row = hsep_planner_quadratic(self);
     const hsep_problem problem = planner_problem(self);
-    hsep_real *free_minimum = problem.x, *v = problem.v, *rows = problem.low, *start = problem.high; /* work */
-    hsep_copy(problem.factor, row, (hsep_int)hsep_triangle(n));
+    hsep_real *free_minimum = problem.x, cost = 0.0, finite = 0.0;
+    hsep_copy(problem.factor, hsep_planner_quadratic(self), (hsep_int)hsep_triangle(n));
     if (!hsep_cholesky_rows(problem.factor, n, 0, n, NULL)) {
         return HSEP_PLAN_FAILED;
     }
-    hsep_copy(free_minimum, v, n);
+    hsep_copy(free_minimum, problem.v, n);
     hsep_cholesky_solve(problem.factor, n, free_minimum);
-    planner_start(self, start);
-    hsep_real cost = 0.0, finite = 0.0;
     for (hsep_int j = 0; j < n; j++) {
-        cost += v[j] * free_minimum[j];
+        cost += problem.v[j] * free_minimum[j];
         finite += hsep_fabs(free_minimum[j]);
-        free_minimum[j] -= start[j]; /* the way there */
     }
     if (!isfinite(finite)) {
         return HSEP_PLAN_FAILED;
     }
-    planner_rows(self, free_minimum, rows);
-    if (planner_allow(self, rows)) {
+    planner_rows(self, free_minimum, problem.low);
+    if (planner_allow(self, problem.low)) {
         planner_take(self, free_minimum);
         return HSEP_PLAN_DONE;
     }
-    for (hsep_int i = 0; i < n; i++) { /* cost += start' P start */
-        hsep_real sum = 0.5 * row[0] * start[i];
-        for (hsep_int j = 1; j < n - i; j++) {
-            sum += row[j] * start[i + j];
-        }
-        cost += 2.0 * start[i] * sum;
-        row += n - i;
-    }
-    if (!self->changes) {
-        planner_pin(self);
-    }
+    planner_pin(self);
     planner_bound(self, cost, steps);
     return HSEP_PLAN_BOUNDED;
 }
@@ -417,16 +376,16 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
 HSEP_API hsep_plan_status hsep_planner_advance(hsep_planner *self)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    if (!hsep_interior_advance(hsep_part(self, self->interior), splines, hsep_planner_quadratic(self))) {
+    hsep_interior *interior = hsep_part(self, self->interior);
+    if (!hsep_interior_advance(interior, splines, hsep_planner_quadratic(self))) {
         return HSEP_PLAN_BOUNDED;
     }
+    const int found = interior->beyond < interior->tolerance.margin; /* something within the bounds */
     const hsep_problem problem = planner_problem(self);
     hsep_real *way = problem.x, *at = problem.v, *rows = problem.low, *from = problem.high, finite = 0.0;
-    planner_start(self, at);
     for (hsep_int j = 0; j < self->solved.m; j++) {
-        const hsep_real inner = problem.inner != NULL ? problem.inner[j] : at[j];
-        at[j] = inner - at[j];
-        way[j] -= inner;
+        at[j] = found ? problem.inner[j] : 0.0;
+        way[j] -= at[j];
         finite += hsep_fabs(way[j]);
     }
     planner_rows(self, way, rows);

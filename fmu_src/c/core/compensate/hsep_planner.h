@@ -18,20 +18,19 @@ typedef struct {
     hsep_int no_reversal;
     hsep_int averaging; /* whether plans are of the averaged model, */
     hsep_int steps;     /* and those of the solver at most */
-    hsep_int changes;   /* whether the cost is of a change of the last plan; otherwise it is of a plan */
     hsep_real jerk_weight;
     hsep_real delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
     hsep_int c;                               /* (3 + n,) m, coefficients */
     hsep_int total;     /* (4 preview,) rows of x_dm under the remainder of the last plan, in shares */
     hsep_int low, high; /* (4 preview,) and their bounds */
-    hsep_int third;     /* (preview,) m, third differences of what the cost begins with */
+    hsep_int third;     /* (preview,) m, third differences of the remainder of the last plan */
     hsep_int P;         /* triangle of n rows */
     hsep_int splines, interior;
     hsep_knots knots;  /* of changes of the last plan, */
     hsep_knots solved; /* and of this cost */
     hsep_int stop;     /* of plans that are longer than what is known; 0: none is */
 } hsep_planner;
-HSEP_ASSERT_WORDS(hsep_planner, 40);
+HSEP_ASSERT_WORDS(hsep_planner, 39);
 
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
@@ -68,26 +67,26 @@ static inline hsep_int hsep_planner_pinned(const hsep_planner *self)
     return self->n_pinned * hsep_planner_splines(self)->spacing;
 }
 
-/* Begin a plan. x_d: commanded positions, m, (preview,); may_turn: whether it may turn where no_reversal forbids it;
- * change: share of change_max that bounds it. The cost of the next one is 1/2 x' P x - v' x of a
- * change of the last one by the splines of the planner's knots, unless hsep_planner_aim or _end sets another one. The
- * caller sets the triangle P of m rows and v, (m,), m; hsep_planner_complete adds the jerk's, times a weight, to v, and
- * to P with what makes it positive definite. */
+/* Begin a plan, a change of the remainder of the last one. x_d: commanded positions, m, (preview,); may_turn: whether it
+ * may turn where no_reversal forbids it; change: share of change_max that bounds it. The cost is 1/2 x' P x - v' x of a
+ * change by the splines of the planner's knots. The caller sets the triangle P of m rows and v, (m,), m;
+ * hsep_planner_complete adds the jerk's, times a weight, to v, and to P with what makes it positive definite. */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], int may_turn, hsep_real change);
 static inline hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight);
 
-/* Set the cost of a plan: of the tracking error of an affine model, and of the jerk. filtered: the spline after it,
- * (preview,); target: x_d minus its response to x_d plus the decided part of delta, (preview,) m. */
-HSEP_API void hsep_planner_aim(hsep_planner *self, const hsep_real filtered[], const hsep_real target[]);
+/* Or set the cost of the tracking error of a linear model, and of the jerk, for a change by all splines. filtered: the
+ * spline after it, (preview,); target: x_d minus its response to x_d under the remainder, (preview,) m. */
+HSEP_API void hsep_planner_aim(
+    hsep_planner *self, const hsep_real filtered[], const hsep_real target[], hsep_real jerk_weight);
 
 /* Open a change of the last plan that ends compensation, with the cost of delta itself, and of its jerk, which makes it
  * as smooth as a short part of a plan allows. It ends where the last plan does. x_d: as hsep_planner_open has it. */
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[]);
 
-/* Plan at this cost, which is used up. The first samples (hsep_planner_pinned) stay as they are in a change of the last
- * plan, and in a bounded plan, which is solved within the tolerance. */
+/* Plan at this cost, which is used up. A plan at the limits leaves its first samples (hsep_planner_pinned) as they are,
+ * and is solved within the tolerance. */
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps);
 
 /* Do half a step of a bounded plan. */
