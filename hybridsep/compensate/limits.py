@@ -35,11 +35,6 @@ class Bounds:
     low: Array
     high: Array
 
-    def allow(self, c: Array) -> bool:
-        """Return whether the coefficients are feasible."""
-        values = self.rows @ c
-        return bool(np.all(values >= self.low) and np.all(values <= self.high))
-
     def of_change(self, plan: Array, splines: Array) -> "Bounds":
         """Return the constraints on a change of a feasible ``plan``, ``(n,)``, m, by sums of splines, ``(n, m)``."""
         here = self.rows @ plan

@@ -144,9 +144,9 @@ def solve(cost: PlanCost, bounds: Bounds, n_pinned: int = 0, *, tolerance: Toler
         return None
     if not np.isfinite(c).all():
         return None
-    if bounds.allow(c):
-        return Minimum(c, 0)
     rows, pinned, nothing = bounds.rows[:, n_pinned:], np.zeros(n_pinned), np.zeros_like(c)
+    if bounds.step(nothing, c) == 1.0:
+        return Minimum(c, 0)
     touched = rows.any(axis=1)
     found = minimise(
         cost.P[n_pinned:, n_pinned:],

@@ -61,7 +61,8 @@ def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
     basis = SplineBasis(80, 4, 80)
     rest: Array = np.asarray(2e-4 * rng.normal(size=basis.values.shape[1]))
     bounds = DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, no_reversal=True)
-    assert bounds.bounds(move(80), np.zeros(3), np.zeros(3), rest).allow(rest[N_DECIDED:])
+    of_plan = bounds.bounds(move(80), np.zeros(3), np.zeros(3), rest).of_change(rest[N_DECIDED:], np.eye(basis.n_free))
+    assert np.all((of_plan.low < 0.0) & (of_plan.high > 0.0))
     assert np.min(np.diff(move(80) + basis.values @ rest)) < -1e-6  # it does turn
 
 

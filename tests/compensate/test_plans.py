@@ -154,7 +154,7 @@ def test_a_bounded_plan_costs_what_another_solver_finds(monkeypatch: pytest.Monk
         c = found.x
         assert np.max(np.maximum(bounds.rows @ c - bounds.high, bounds.low - bounds.rows @ c)) <= 1e-12
         free = np.asarray(np.linalg.solve(cost.P, cost.v), dtype=np.float64)
-        if bounds.allow(free):
+        if bounds.step(np.zeros_like(free), free) == 1.0:
             np.testing.assert_allclose(c, free, rtol=0, atol=1e-9)
             return found
         assert not c[:n_pinned].any()
@@ -182,9 +182,9 @@ def test_a_refused_solve_falls_back_to_physics_then_to_the_rest(monkeypatch: pyt
         sep.update(1e-5 + 1e-6 * rng.normal(size=50))
     assert state is SepState.HYBRID
     answers: list[Callable[..., Any]] = [lambda *_, **__: None, solve]
-    monkeypatch.setattr("hybridsep.compensate.planning.solve", lambda *a, **more: answers.pop(0)(*a, **more))
+    monkeypatch.setattr("hybridsep.compensate.qp.solve", lambda *a, **more: answers.pop(0)(*a, **more))
     assert sep.plan(ahead[:200]).state is SepState.PHYSICS
-    monkeypatch.setattr("hybridsep.compensate.planning.solve", lambda *_, **__: None)
+    monkeypatch.setattr("hybridsep.compensate.qp.solve", lambda *_, **__: None)
     assert sep.plan(ahead[:200]).state is SepState.OFF
 
 

@@ -226,19 +226,6 @@ static hsep_real planner_share(const hsep_planner *self, const hsep_real from[],
     return share;
 }
 
-/* Whether the remainder and a step with rows way are feasible. */
-static int planner_allow(const hsep_planner *self, const hsep_real way[])
-{
-    const hsep_real *total = hsep_at_const(self, self->total);
-    const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);
-    int allow = 1;
-    for (hsep_int r = 0; r < HSEP_ORDERS * hsep_planner_splines(self)->preview; r++) {
-        const hsep_real there = total[r] + way[r];
-        allow = allow && there <= high[r] && there >= low[r];
-    }
-    return allow;
-}
-
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[])
 {
     return self->jerk_weight * planner_third(self, c, HSEP_N_DECIDED + hsep_planner_splines(self)->n, work);
@@ -258,13 +245,22 @@ static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int n = self->solved.m;
+    const hsep_int n = self->solved.m, preview = splines->preview;
     const hsep_problem problem = planner_problem(self);
-    const hsep_real *third = hsep_at(self, self->third);
-    hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0;
-    hsep_splines_jerk(splines, jerk_weight, third, planner_first(self), problem.products, problem.c);
-    hsep_knots_narrow(&self->solved, problem.c, problem.v);
+    const hsep_real *third = hsep_at(self, self->third), share = splines->share[3];
+    hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0, *rows = problem.low;
+    hsep_zero(rows, HSEP_ORDERS * preview); /* third differences, as rows, without their limit */
+    for (hsep_int k = 0; k < preview; k++) {
+        rows[3 * preview + k] = jerk_weight / (share * share);
+    }
+    hsep_splines_gram(splines, rows, planner_first(self), problem.products, problem.high);
     hsep_knots_add(&self->solved, problem.products, P, problem.c);
+    for (hsep_int k = 0; k < preview; k++) {
+        rows[3 * preview + k] = -jerk_weight / share * third[k];
+    }
+    hsep_zero(problem.c, self->solved.n);
+    hsep_splines_transpose(splines, rows, planner_first(self), problem.c);
+    hsep_knots_narrow(&self->solved, problem.c, problem.v);
     for (hsep_int i = 0; i < n; i++) {
         largest = hsep_fmax(largest, *diagonal);
         diagonal += n - i;
@@ -364,7 +360,8 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
         return HSEP_PLAN_FAILED;
     }
     planner_rows(self, free_minimum, problem.low);
-    if (planner_allow(self, problem.low)) {
+    hsep_zero(problem.high, HSEP_ORDERS * hsep_planner_splines(self)->preview);
+    if (planner_share(self, problem.high, problem.low) == 1.0) {
         planner_take(self, free_minimum);
         return HSEP_PLAN_DONE;
     }

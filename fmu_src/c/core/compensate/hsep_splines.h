@@ -312,30 +312,6 @@ static inline void hsep_splines_filtered_gram(
     }
 }
 
-/* The products weight D' D, and g, (n - first,), := -weight D' third, with the third differences D of the splines
- * first ... n - 1, m; third: (preview,) m. */
-static inline void hsep_splines_jerk(
-    const hsep_splines *self, hsep_real weight, const hsep_real third[], hsep_int first, hsep_real products[],
-    hsep_real g[])
-{
-    const hsep_real *e = splines_differences(self, 3);
-    const hsep_int n = self->n - first, length = splines_length(self, 3);
-    const hsep_real unit = 1.0 / self->share[3], of_third = weight / self->share[3];
-    hsep_zero(products, HSEP_KNOTS_WIDTH * n);
-    for (hsep_int d = 0; d < n && d * self->spacing + 1 < length; d++) {
-        hsep_real sum = 0.0;
-        for (hsep_int k = d * self->spacing + 1; k < length; k++) {
-            sum += (e[k] * unit) * (e[k - d * self->spacing] * unit);
-        }
-        for (hsep_int i = 0; i + d < n; i++) {
-            splines_product(products, i, d, weight * sum);
-        }
-    }
-    for (hsep_int j = first; j < self->n; j++) {
-        g[j - first] = -(of_third * hsep_dot(e + 1, third + j * self->spacing + 1, length - 1));
-    }
-}
-
 /* Cubic splines with knots 1, 2 and 4 spacings apart as sums of those 1 apart: the two-scale relation. */
 static const hsep_real knots_shares[] = {1.0,      0.125,   0.5,     0.75,     0.5,     0.125,  0.015625,
                                          0.0625,   0.15625, 0.3125,  0.484375, 0.625,   0.6875, 0.625,
