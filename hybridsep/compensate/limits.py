@@ -28,17 +28,16 @@ _MOVES = 1e-12  # smallest step of the commanded position that counts as motion,
 
 @dataclass(frozen=True)
 class Bounds:
-    """Linear inequality constraints ``low ≤ rows @ c ≤ high`` on the coefficients, normalised by the limits."""
+    """Linear inequality constraints ``low ≤ rows @ c ≤ high`` on a change ``c`` of a plan, normalised by the limits."""
 
     rows: Array  # (m, n), 1/m
     # (m,): hard bounds
     low: Array
     high: Array
 
-    def of_change(self, plan: Array, splines: Array) -> "Bounds":
-        """Return the constraints on a change of a feasible ``plan``, ``(n,)``, m, by sums of splines, ``(n, m)``."""
-        here = self.rows @ plan
-        return Bounds(self.rows @ splines, self.low - here, self.high - here)
+    def by(self, splines: Array) -> "Bounds":
+        """Return the constraints on a change by sums of splines, ``(n, m)``."""
+        return Bounds(self.rows @ splines, self.low, self.high)
 
     def step(self, start: Array, c: Array) -> float:
         """Return the largest feasible step length, 0 … 1, from feasible coefficients ``start`` towards ``c``."""
@@ -96,7 +95,7 @@ class DriveBounds:
         may_turn: bool = False,
         change: float = 1.0,
     ) -> Bounds:
-        """Return the bounds on the free coefficients of a plan.
+        """Return the bounds on a change of the remainder of the last plan by free coefficients.
 
         ``x_d``: (preview,), m: commanded positions. Within the length of a spline of where they exceed a limit, it is
         widened by what they take of it; ``x_d_before``, ``delta_before``: (3,), m: last three commanded positions
@@ -105,10 +104,8 @@ class DriveBounds:
         ``no_reversal`` forbids it; ``change``: share of ``change_max`` that bounds ``|δ|``.
         """
         low, high = self.hard(x_d, x_d_before, delta_before, may_turn=may_turn, change=change)
-        taken = self._all[:, :N_DECIDED] @ previous_plan[:N_DECIDED]
-        at_rest = self._free @ previous_plan[N_DECIDED:]
-        low, high = np.minimum(low - taken, at_rest - _INTERIOR), np.maximum(high - taken, at_rest + _INTERIOR)
-        return Bounds(rows=self._free, low=low, high=high)
+        taken = self._all @ previous_plan
+        return Bounds(self._free, np.minimum(low - taken, -_INTERIOR), np.maximum(high - taken, _INTERIOR))
 
     def hard(
         self, x_d: Array, x_d_before: Array, delta_before: Array, *, may_turn: bool = True, change: float = 1.0

@@ -174,5 +174,5 @@ def solve_change(
     :func:`solve`. Returns the coefficients, ``(3 + n,)``, m; None if there is no finite minimiser.
     """
     decided, last = np.split(previous_plan, [N_DECIDED])
-    found = solve(cost, bounds.of_change(last, splines), n_pinned, tolerance=tolerance)
+    found = solve(cost, bounds.by(splines), n_pinned, tolerance=tolerance)
     return None if found is None else np.concatenate((decided, last + splines @ found.x))

@@ -52,10 +52,10 @@ class Stop:
         over the known preview.
         """
         n = N_DECIDED + self.n_shared
-        now = self._stopping @ plan[:n]
-        of_old, own = self.rows @ old, self.rows @ (old - self._stopping @ old[:n])
-        low, high = np.minimum(low, of_old) - ROUNDING, np.maximum(high, of_old) + ROUNDING
-        start, way = of_old - own, self.rows @ now - (of_old - own)
+        own_part = old - self._stopping @ old[:n]
+        start, own = self.rows @ (self._stopping @ old[:n]), self.rows @ own_part
+        low, high = np.minimum(low, start + own) - ROUNDING, np.maximum(high, start + own) + ROUNDING
+        way = self.rows @ (self._stopping @ plan[:n]) - start
         # Lengths and shares that keep all bounds are a convex set with the last stop in it: the longest by bisection
         length, share, too_long, tried = 0.0, 1.0, 1.0, 1.0
         for _ in range(_TRIES):
@@ -68,7 +68,7 @@ class Stop:
                 break
             tried = 0.5 * (length + too_long)
         shared = old[:n] + length * (plan[:n] - old[:n])
-        stop = self._stopping @ shared + share * (old - self._stopping @ old[:n])
+        stop = self._stopping @ shared + share * own_part
         if length == 1.0:
             return plan, stop
         # After what the next plan shares of it, too, the change fades, and ends with the plan

@@ -135,7 +135,7 @@ def test_few_steps_leave_a_plan_within_the_bounds(seed: int) -> None:
     def above_least(c: Array) -> float:
         return float(0.5 * (c @ P @ c - least @ P @ least) - v @ (c - least))
 
-    found = solve(of_change, bounds.of_change(rest, splines), tolerance=TOLERANCE)
+    found = solve(of_change, bounds.by(splines), tolerance=TOLERANCE)
     assert found is not None
     assert found.steps > 0  # bounds are active
     values = bounds.rows @ splines @ found.x

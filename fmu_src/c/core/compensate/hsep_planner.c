@@ -2,26 +2,7 @@
 
 #include "hsep_cholesky.h"
 #include "hsep_interior.h"
-
-/* Stops of plans that are longer than the preview: after the preview a plan takes the command to go on at its last
- * velocity. What comes may be another command, so each plan has a stop beside it: it shares the splines that are
- * carried out before the next plan, and then brings the change of the command to a constant within the preview, which
- * takes nothing of the limits of what follows. A plan is carried out as far as it has a stop within the limits;
- * otherwise the last stop goes on. */
-typedef struct {
-    hsep_int preview; /* samples of the command that are known */
-    hsep_int shared;  /* splines that a stop has from its plan, a window's and the next plan's pinned ones, */
-    hsep_int n;       /* and those before all coefficients are alike */
-    hsep_int count;   /* coefficients: the decided ones and of all splines that begin in the preview */
-    hsep_int last;    /* (count,) m, the last stop, */
-    hsep_int own;     /* (count,) m, by which it differs from one that stops as these do, */
-    hsep_int now;     /* (count,) m, and the stop of the plan */
-    hsep_int gains;   /* (2 (n - shared),) of the first two differences of coefficients, which make the next one */
-    /* (4 preview,) in shares */
-    hsep_int low, high;            /* bounds of the rows of a change, */
-    hsep_int start, way, own_rows; /* the last stop without its own part, the way to the plan's, and that part */
-} hsep_stop;
-HSEP_ASSERT_WORDS(hsep_stop, 13);
+#include "hsep_stop.h"
 
 /* Where the solver ends. */
 static hsep_tolerance planner_tolerance(hsep_int averaging)
@@ -56,26 +37,6 @@ HSEP_API hsep_knots hsep_planner_knots(const hsep_predictor_parameters *paramete
     return hsep_knots_of(n - planner_n_pinned(parameters), wider ? parameters->settings.Np / spacing : 0);
 }
 
-static hsep_real stop_lay_out(hsep_stop *self, const hsep_predictor_parameters *parameters)
-{
-    const hsep_int preview = parameters->preview, spacing = parameters->compensator.spacing;
-    hsep_real end = HSEP_WORDS(hsep_stop);
-    self->preview = preview;
-    self->shared = parameters->settings.Np / spacing + planner_n_pinned(parameters);
-    self->n = (preview - HSEP_SPLINES_END) / spacing - 2;
-    self->count = HSEP_N_DECIDED + (preview + spacing - 1) / spacing;
-    self->last = hsep_take(&end, (hsep_real)self->count);
-    self->own = hsep_take(&end, (hsep_real)self->count);
-    self->now = hsep_take(&end, (hsep_real)self->count);
-    self->gains = hsep_take(&end, 2.0 * (hsep_real)(self->n - self->shared));
-    self->low = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
-    self->high = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
-    self->start = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
-    self->way = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
-    self->own_rows = hsep_take(&end, HSEP_ORDERS * (hsep_real)preview);
-    return end * sizeof(hsep_real);
-}
-
 HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_predictor_parameters *parameters)
 {
     const hsep_int spacing = parameters->compensator.spacing, n = hsep_splines_count(parameters->horizon, spacing);
@@ -89,7 +50,6 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_predictor
     self->knots = hsep_planner_knots(parameters);
     self->jerk_weight = parameters->compensator.jerk_weight;
     self->c = hsep_take(&end, HSEP_N_DECIDED + (hsep_real)n);
-    self->total = hsep_take(&end, HSEP_ORDERS * preview);
     self->low = hsep_take(&end, HSEP_ORDERS * preview);
     self->high = hsep_take(&end, HSEP_ORDERS * preview);
     self->third = hsep_take(&end, preview);
@@ -97,35 +57,9 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_predictor
     self->splines = hsep_take_block(&end, hsep_splines_lay_out(&(hsep_splines){0}, parameters->horizon, spacing));
     self->interior = hsep_take_block(&end, hsep_interior_size(parameters->horizon, n));
     if (parameters->preview < parameters->horizon) {
-        self->stop = hsep_take_block(&end, stop_lay_out(&(hsep_stop){0}, parameters));
+        self->stop = hsep_take_block(&end, hsep_stop_lay_out(&(hsep_stop){0}, parameters, self->n_pinned));
     }
     return end * sizeof(hsep_real);
-}
-
-/* The gains that minimise the sum of squares of the differences of orders 1 to 3, in limits: a backward Riccati
- * recursion (Kalman 1960) from a change that is constant. */
-static void stop_gains(hsep_stop *self, const hsep_splines *splines)
-{
-    const hsep_real spacing = (hsep_real)splines->spacing;
-    hsep_real of[HSEP_ORDERS] = {0.0}, unit = 1.0, *gains = hsep_at(self, self->gains);
-    for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-        unit *= spacing;
-        of[order] = (splines->share[order] / unit) * (splines->share[order] / unit);
-    }
-    const hsep_real one = of[1], two = of[2], three = of[3];
-    hsep_real p11 = two + 2.0 * three, p12 = three, p22 = three; /* the difference after the last spline is 0 */
-    for (hsep_int i = self->n - self->shared; i-- > 0;) {
-        const hsep_real both = p12 + p22, total = one + two + three + p11 + p12 + both;
-        const hsep_real g1 = (two + three + both) / total, g2 = three / total, h1 = g1 - 1.0, h2 = g2 - 1.0;
-        /* The cost of differences x, y before: u = g1 x + g2 y, then u - x, then u - x - y */
-        const hsep_real q11 =
-            one * g1 * g1 + (two + three) * h1 * h1 + p11 * g1 * g1 + 2.0 * p12 * g1 * h1 + p22 * h1 * h1;
-        const hsep_real q12 =
-            one * g1 * g2 + two * h1 * g2 + three * h1 * h2 + p11 * g1 * g2 + p12 * (g1 * g2 + h1 * g2) + p22 * h1 * g2;
-        p22 = one * g2 * g2 + two * g2 * g2 + three * h2 * h2 + (p11 + 2.0 * p12 + p22) * g2 * g2;
-        p11 = q11, p12 = q12;
-        gains[2 * i] = g1, gains[2 * i + 1] = g2;
-    }
 }
 
 HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_predictor_parameters *parameters, hsep_real start)
@@ -141,19 +75,16 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_predictor_paramet
     }
     hsep_splines_init(hsep_part(self, self->splines), parameters->horizon, settings->spacing, limits);
     if (self->stop > 0) {
-        const hsep_splines *splines = hsep_planner_splines(self);
-        hsep_stop *stop = hsep_part(self, self->stop);
-        (void)stop_lay_out(stop, parameters);
-        stop_gains(stop, splines);
+        hsep_stop_init(hsep_part(self, self->stop), parameters, self->n_pinned, hsep_planner_splines(self));
     }
 }
 
-/* Rows of x_dm, (4 preview,) in shares, under the first count coefficients of the remainder of the last plan; of order
- * 0 of only the change. low, high: the limits, with a share of change_max. Where x_d itself exceeds one within the
- * length of a spline, as a command that is held or rounded does, what it takes is added to the limit. */
+/* Bounds of the rows of a change beyond the first count coefficients of the remainder of the last plan, (4 preview,) in
+ * shares: the limits, with a share of change_max, without what x_d and these coefficients take of them. Where x_d itself
+ * exceeds one within the length of a spline, as a command that is held or rounded does, the limit is wider by that. */
 static void planner_limits(
-    const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int preview, hsep_real change_max,
-    hsep_real total[], hsep_real low[], hsep_real high[])
+    const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int preview, int may_turn,
+    hsep_real change_max, hsep_real low[], hsep_real high[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     /* apart: a sum would be rounded to what a position is, much coarser than a third difference of a change */
@@ -164,15 +95,16 @@ static void planner_limits(
     for (hsep_int k = 0; k < preview; k++) {
         hsep_differ(path, x_d[k]);
         hsep_differ(change, hsep_splines_sum(splines, hsep_at_const(self, self->c), count, k));
-        total[k] = change[0] * splines->share[0];
-        for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-            total[order * preview + k] = (path[order] + change[order]) * splines->share[order];
+        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+            const hsep_int r = order * preview + k;
+            const hsep_real taken = ((order > 0 ? path[order] : 0.0) + change[order]) * splines->share[order];
+            const hsep_real exceeded = high[r], room = (1.0 - HSEP_LIMITS_ROUNDING) * (order > 0 ? 1.0 : change_max);
+            const int keeps = order == 1 && !may_turn; /* the direction of x_d */
+            const hsep_real least = keeps && path[1] > HSEP_LIMITS_MOVES ? 0.0 : hsep_fmin(exceeded, 0.0) - room;
+            const hsep_real most = keeps && path[1] < -HSEP_LIMITS_MOVES ? 0.0 : hsep_fmax(exceeded, 0.0) + room;
+            low[r] = least - taken;
+            high[r] = most - taken;
         }
-    }
-    for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
-        const hsep_real exceeded = high[r], most = (1.0 - HSEP_LIMITS_ROUNDING) * (r < preview ? change_max : 1.0);
-        low[r] = hsep_fmin(exceeded, 0.0) - most;
-        high[r] = hsep_fmax(exceeded, 0.0) + most;
     }
 }
 
@@ -193,32 +125,25 @@ static hsep_real planner_third(const hsep_planner *self, const hsep_real c[], hs
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], int may_turn, hsep_real change)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int count = HSEP_N_DECIDED + splines->n, preview = splines->preview;
-    hsep_real *total = hsep_at(self, self->total), *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
+    const hsep_int count = HSEP_N_DECIDED + splines->n;
+    hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
     self->solved = self->knots;
-    planner_limits(self, x_d, count, preview, change, total, low, high);
+    planner_limits(self, x_d, count, splines->preview, may_turn || !self->no_reversal, change, low, high);
     (void)planner_third(self, hsep_at(self, self->c), count, hsep_at(self, self->third));
-    for (hsep_int k = 0; k < preview && self->no_reversal && !may_turn; k++) { /* velocities */
-        const hsep_real step = x_d[k] - (k > 0 ? x_d[k - 1] : self->x_d_before[2]);
-        low[preview + k] = step > HSEP_LIMITS_MOVES ? 0.0 : low[preview + k];
-        high[preview + k] = step < -HSEP_LIMITS_MOVES ? 0.0 : high[preview + k];
-    }
-    /* The remainder is always feasible, with a small margin: an interior-point method needs an interior */
-    for (hsep_int r = 0; r < HSEP_ORDERS * preview; r++) {
-        low[r] = hsep_fmin(low[r], total[r] - HSEP_LIMITS_INTERIOR);
-        high[r] = hsep_fmax(high[r], total[r] + HSEP_LIMITS_INTERIOR);
+    /* No change is always feasible, with a small margin: an interior-point method needs an interior */
+    for (hsep_int r = 0; r < HSEP_ORDERS * splines->preview; r++) {
+        low[r] = hsep_fmin(low[r], -HSEP_LIMITS_INTERIOR);
+        high[r] = hsep_fmax(high[r], HSEP_LIMITS_INTERIOR);
     }
 }
 
-/* Largest feasible length, 0 ... 1, of a step with rows way from a plan, with rows of the remainder + from. */
+/* Largest feasible length, 0 ... 1, of a step with rows way from a change with rows from. */
 static hsep_real planner_share(const hsep_planner *self, const hsep_real from[], const hsep_real way[])
 {
-    const hsep_real *total = hsep_at_const(self, self->total);
     const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);
     hsep_real share = 1.0;
     for (hsep_int r = 0; r < HSEP_ORDERS * hsep_planner_splines(self)->preview; r++) {
-        const hsep_real here = total[r] + from[r];
-        const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? high[r] - here : here - low[r];
+        const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? high[r] - from[r] : from[r] - low[r];
         if (to > HSEP_LIMITS_ROUNDING && room < share * to) {
             share = room / to;
         }
@@ -321,12 +246,10 @@ static void planner_bound(hsep_planner *self, hsep_real cost, hsep_int steps)
 {
     hsep_tolerance tolerance = planner_tolerance(self->averaging);
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_real *total = hsep_at(self, self->total);
-    const hsep_real *least = hsep_at(self, self->low), *most = hsep_at(self, self->high);
     const hsep_problem problem = planner_problem(self);
     for (hsep_int r = 0; r < HSEP_ORDERS * splines->preview; r++) {
-        problem.low[r] = least[r] - total[r] + tolerance.margin;
-        problem.high[r] = most[r] - total[r] - tolerance.margin;
+        problem.low[r] = hsep_at(self, self->low)[r] + tolerance.margin;
+        problem.high[r] = hsep_at(self, self->high)[r] - tolerance.margin;
     }
     tolerance.steps = steps;
     hsep_interior_begin(
@@ -395,115 +318,13 @@ HSEP_API hsep_plan_status hsep_planner_advance(hsep_planner *self)
     return HSEP_PLAN_DONE;
 }
 
-/* Stop after decided and shared coefficients, in place, (count,) m. */
-static void stop_behind(const hsep_stop *self, hsep_real c[])
+HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[])
 {
-    const hsep_real *gains = hsep_at_const(self, self->gains);
-    hsep_int i = HSEP_N_DECIDED + self->shared;
-    hsep_real first = c[i - 1] - c[i - 2], second = first - (c[i - 2] - c[i - 3]);
-    for (; i < HSEP_N_DECIDED + self->n; i++, gains += 2) {
-        const hsep_real before = first;
-        first = gains[0] * first + gains[1] * second;
-        second = first - before;
-        c[i] = c[i - 1] + first;
-    }
-    for (; i < self->count; i++) {
-        c[i] = c[i - 1];
-    }
-}
-
-/* Rows of a change with coefficients c, (count,) m, in shares, (4 preview,). */
-static void stop_rows(const hsep_stop *self, const hsep_splines *splines, const hsep_real c[], hsep_real rows[])
-{
-    hsep_real now[HSEP_ORDERS] = {0.0};
-    for (hsep_int k = 0; k < self->preview; k++) {
-        hsep_differ(now, hsep_splines_sum(splines, c, self->count, k));
-        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-            rows[order * self->preview + k] = now[order] * splines->share[order];
-        }
-    }
-}
-
-/* Bounds of the rows of a change: what limits and command leave, and the last stop at least. total: work. */
-static void stop_bounds(hsep_stop *self, const hsep_planner *planner, const hsep_real x_d[], hsep_real total[])
-{
-    const hsep_real *start = hsep_at(self, self->start);
-    hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
-    planner_limits(planner, x_d, 0, self->preview, 1.0, total, low, high);
-    for (hsep_int r = 0; r < HSEP_ORDERS * self->preview; r++) {
-        low[r] = hsep_fmin(low[r] - total[r], start[r]) - HSEP_LIMITS_ROUNDING;
-        high[r] = hsep_fmax(high[r] - total[r], start[r]) + HSEP_LIMITS_ROUNDING;
-    }
-}
-
-/* Share of the last stop's own part, nearest 0, with which all rows keep their bounds, so far on the way; NaN: none. */
-static hsep_real stop_share(const hsep_stop *self, hsep_real length)
-{
-    const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);
-    const hsep_real *start = hsep_at_const(self, self->start), *way = hsep_at_const(self, self->way);
-    const hsep_real *own = hsep_at_const(self, self->own_rows);
-    hsep_real least = -HSEP_STOP_MOST, most = HSEP_STOP_MOST;
-    for (hsep_int r = 0; r < HSEP_ORDERS * self->preview; r++) {
-        const hsep_real row = start[r] + length * way[r];
-        if (hsep_fabs(own[r]) > HSEP_STOP_STILL) {
-            const hsep_real a = (low[r] - row) / own[r], b = (high[r] - row) / own[r];
-            least = hsep_fmax(least, hsep_fmin(a, b));
-            most = hsep_fmin(most, hsep_fmax(a, b));
-        } else if (!(row >= low[r] && row <= high[r])) {
-            return (hsep_real)NAN;
-        }
-    }
-    return least <= most ? hsep_fmin(hsep_fmax(0.0, least), most) : (hsep_real)NAN;
-}
-
-HSEP_API void hsep_planner_carry_out(hsep_planner *planner, const hsep_real x_d[])
-{
-    if (planner->stop == 0) {
-        return;
-    }
-    hsep_stop *self = hsep_part(planner, planner->stop);
-    const hsep_splines *splines = hsep_planner_splines(planner);
-    hsep_real *plan = hsep_at(planner, planner->c);
-    const hsep_int first = HSEP_N_DECIDED + self->shared, rows = HSEP_ORDERS * self->preview;
-    hsep_real *last = hsep_at(self, self->last), *own = hsep_at(self, self->own), *now = hsep_at(self, self->now);
-    hsep_real *start = hsep_at(self, self->start), *way = hsep_at(self, self->way);
-    hsep_real *own_rows = hsep_at(self, self->own_rows);
-    hsep_real length = 0.0, share = 1.0, too_long = 1.0, tried = 1.0;
-    hsep_copy(own, last, first);
-    stop_behind(self, own);
-    for (hsep_int i = 0; i < self->count; i++) {
-        own[i] = last[i] - own[i];
-    }
-    hsep_copy(now, plan, first);
-    stop_behind(self, now);
-    stop_rows(self, splines, last, start);
-    stop_bounds(self, planner, x_d, way);
-    stop_rows(self, splines, own, own_rows);
-    stop_rows(self, splines, now, way);
-    for (hsep_int r = 0; r < rows; r++) {
-        start[r] -= own_rows[r];
-        way[r] -= start[r];
-    }
-    for (int tries = 0; tries < HSEP_STOP_TRIES && length < 1.0; tries++) { /* convex, with the last stop in it */
-        const hsep_real found = stop_share(self, tried);
-        if (isnan(found)) {
-            too_long = tried;
-        } else {
-            length = tried;
-            share = found;
-        }
-        tried = 0.5 * (length + too_long);
-    }
-    for (hsep_int i = 0; i < first; i++) {
-        last[i] += length * (plan[i] - last[i]);
-    }
-    stop_behind(self, last);
-    hsep_axpy(last, share, own, self->count);
-    const hsep_int all = HSEP_N_DECIDED + splines->n, begin = first + self->shared;
-    for (hsep_int i = 0; i < all && length < 1.0; i++) { /* after what the next plan shares of it the change fades */
-        const hsep_real gone = i > begin ? (hsep_real)(i - begin) / (hsep_real)(all - begin) : 0.0;
-        const hsep_real left = 1.0 - gone * gone * gone;
-        plan[i] = left * left * left * last[hsep_min(i, self->count - 1)];
+    if (self->stop > 0) {
+        hsep_stop *stop = hsep_part(self, self->stop);
+        hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
+        planner_limits(self, x_d, 0, stop->preview, 1, 1.0, low, high);
+        hsep_stop_carry_out(stop, hsep_planner_splines(self), low, high, hsep_at(self, self->c));
     }
 }
 

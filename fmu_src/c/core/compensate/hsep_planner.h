@@ -21,8 +21,7 @@ typedef struct {
     hsep_real jerk_weight;
     hsep_real delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
     hsep_int c;                               /* (3 + n,) m, coefficients */
-    hsep_int total;     /* (4 preview,) rows of x_dm under the remainder of the last plan, in shares */
-    hsep_int low, high; /* (4 preview,) and their bounds */
+    hsep_int low, high; /* (4 preview,) bounds of the rows of a change of the remainder of the last plan, in shares */
     hsep_int third;     /* (preview,) m, third differences of the remainder of the last plan */
     hsep_int P;         /* triangle of n rows */
     hsep_int splines, interior;
@@ -30,7 +29,7 @@ typedef struct {
     hsep_knots solved; /* and of this cost */
     hsep_int stop;     /* of plans that are longer than what is known; 0: none is */
 } hsep_planner;
-HSEP_ASSERT_WORDS(hsep_planner, 39);
+HSEP_ASSERT_WORDS(hsep_planner, 38);
 
 /* The splines of a plan; hsep_splines_shape is to be filtered. */
 static inline const hsep_splines *hsep_planner_splines(const hsep_planner *self)
