@@ -10,8 +10,7 @@ from stream import OUTPUTS, Array, Stream, kind_of, machine_of
 from hybridsep.plants.plant import Encoder
 from hybridsep.plants.trajectory import PAPER_LIMITS, rest_to_rest
 
-LIMITS = {"trajectory": (0.08, 8.0, 1000.0), "drive": (0.1, 16.0, 5000.0)}
-"""v_max, a_max and j_max: the trajectory's, so that nearly every plan is bounded, and the usual ones."""
+LIMITS = (0.08, 8.0, 1000.0), (0.1, 16.0, 5000.0)  # v_max, a_max, j_max: the trajectory's bound most plans; the usual
 
 
 @dataclass(frozen=True)
@@ -49,12 +48,9 @@ def random_loop(seed: int, n: int, **fixed: float) -> RandomLoop:
         "q": int(rng.integers(0, min(Np, 45))),
         "lambda": float(10 ** rng.uniform(-12, -6)),
     }
-    chosen = (LIMITS["trajectory"], LIMITS["drive"], None)[rng.integers(3)]
-    if chosen is None:
-        v_max, a_max, j_max = np.array(LIMITS["trajectory"]) * rng.uniform(1, 3, 3)
-        chosen = float(v_max), float(a_max), float(j_max)
-    values |= dict(zip(("v_max", "a_max", "j_max"), chosen, strict=True))
-    values |= {
+    one = int(rng.integers(3))
+    chosen = LIMITS[one] if one < 2 else (np.array(LIMITS[0]) * rng.uniform(1, 3, 3)).tolist()
+    values |= dict(zip(("v_max", "a_max", "j_max"), chosen, strict=True)) | {
         "change_max": float(rng.choice([1e-4, 2e-4, 5e-4, 1e-3, 5e-3])),
         "jerk_weight": float(10 ** rng.uniform(-2, 2.5)),
         "no_reversal": int(rng.integers(2)),
@@ -62,8 +58,10 @@ def random_loop(seed: int, n: int, **fixed: float) -> RandomLoop:
     }
     stops = np.cumsum(np.concatenate(([0.0], rng.uniform(-0.01, 0.01, 30))))
     r = rest_to_rest(stops, PAPER_LIMITS, TS, dwell=float(rng.uniform(0, 0.3)))[:n]
-    start = float(rng.choice([0.0, 0.1]))
-    return RandomLoop({"averaging": 0, "horizon": 0, **values, **fixed}, r + start, int(rng.integers(1000)))
+    if part := int(fixed.get("recall", 0)) // 4:  # a memory has two of the way there and back, which is repeated
+        r = np.resize(np.concatenate((r[:part], r[part - 1 :: -1])), n)
+    r = r + float(rng.choice([0.0, 0.1]))
+    return RandomLoop({"averaging": 0, "horizon": 0, **values, **fixed}, r, int(rng.integers(1000)))
 
 
 def run(stream: Stream, loop: RandomLoop, *, nudged: bool = False) -> tuple[Array, Array]:
