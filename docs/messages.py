@@ -84,7 +84,7 @@ FINDINGS: Mapping[str, Explanation] = {
         "Name the column of the measured position with `--x`.",
     ),
     "wraps": Explanation(
-        "A position jumps by 2¹⁶ of its smallest steps, and goes on after the jump as before it: a counter wraps.",
+        "The measured position jumps by all that it reaches and goes on: a counter or a modulo axis begins anew.",
         "Unwrap it before, as by `numpy.unwrap(x, period=...)` with the message's period, or record it with more bits.",
     ),
     "unit": Explanation(
@@ -97,13 +97,13 @@ FINDINGS: Mapping[str, Explanation] = {
         "recorded too early instead: `--delay`, negative.",
     ),
     "sign": Explanation(
-        "The measured position moves opposite to its command.",
-        "Correct it where it is recorded; your controller must do the same.",
+        "The measured position moves opposite to its command; or what `--error` tells runs ahead of it.",
+        "Correct it where it is recorded; your controller must do the same. Of an error give the message's option.",
     ),
     "following error": Explanation(
         "The measured position's column holds the following error, which controllers call *lag* or *contouring "
         "deviation*.",
-        "Name the column of the actual position with `--x`, or write the command less the error into the file.",
+        "Name the column of the actual position with `--x`, or this one with `--error`.",
     ),
     "velocity": Explanation("One of the columns holds a velocity.", "Name the column of the position."),
     "scale": Explanation(

@@ -61,6 +61,7 @@ _OWN = {
     "log.t": "column of the time",
     "log.x_d": "column of the commanded position",
     "log.x": "column of the measured position",
+    "log.error": "column of the error, commanded − measured, in the place of one of them",
     "log.unit": "unit of the positions in the file",
     "log.axis": "axis of a file that holds several",
     "physics.mode": "modes, at least one",

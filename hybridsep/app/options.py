@@ -83,6 +83,13 @@ class ReadingOptions:
     t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None
     x_d: Annotated[str | None, typer.Option("--x_d", help="Name of the commanded position's column.")] = None
     x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None
+    error: Annotated[
+        str | None,
+        typer.Option(
+            "--error",
+            help="Name of the error's column, commanded − measured (--error=-NAME: the other way) beside one position.",
+        ),
+    ] = None
     delay: Annotated[
         int, typer.Option(help="Samples by which the log has the measured position too late (negative: too early).")
     ] = 0
@@ -96,13 +103,15 @@ class ReadingOptions:
 
     def arguments(self, machine: "Machine | None" = None) -> dict[str, Any]:
         """Return the arguments, as a machine's file says where an option does not say otherwise."""
-        columns = {role: column for role in ("t", "x_d", "x") if (column := getattr(self, role))}
+        columns = {role: column for role in ("t", "x_d", "x", "error") if (column := getattr(self, role))}
         given = {"T_s": self.T_s, "delay": self.delay, "resample": self.resample}
         if machine is None:
             return {**given, "columns": columns, "unit": self.unit, "axis": self.axis}
         own = machine.log
-        # with a sampling interval there may be no times
-        names = {role: column for role, column in own.columns.items() if role != "t" or self.T_s is None}
+        # with a sampling interval there may be no times, and an error is in the place of a position
+        others = {"t"} if self.T_s is not None else set()
+        others |= {"x_d" if self.x else "x"} if self.error else set()
+        names = {role: column for role, column in own.columns.items() if role not in others}
         own_values = {"unit": self.unit or own.unit, "axis": self.axis or own.axis}
         return {**given, **own_values, "columns": {**names, **columns}}
 

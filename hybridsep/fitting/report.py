@@ -255,8 +255,8 @@ def write_use(report: Report, fmu: str, T_s: float, Np: int, log: Log) -> None:
     ``T_s`` is the sampling interval, s, ``Np`` the samples of the look-ahead, ``log`` the one that it replays.
     """
     report.heading("Use it")
-    reading = f'log = hybridsep.read_log("{log.path.name}", columns={dict(zip(("x_d", "x"), log.columns, strict=True))}'
-    unit = "" if stated_unit(log.columns[0])[1] else log.file_unit
+    reading = f'log = hybridsep.read_log("{log.path.name}", columns={dict(log.columns)}'
+    unit = "" if stated_unit(next(iter(log.columns.values())))[1] else log.file_unit
     reading += "".join(f", {name}={value!r}" for name, value in (("unit", unit), ("T_s", log.T_recorded)) if value)
     of_file = f"import hybridsep\n\n{reading})\nx_d, x_meas = log.x_d, log.x_meas"
     in_memory = f"# x_d, x_meas: the arrays of the fit in {log.unit}, one sample every {T_s!r} s"

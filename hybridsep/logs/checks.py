@@ -20,6 +20,7 @@ from scipy.optimize import nnls
 from ..base.errors import LogError
 from ..base.signals import Array, Indices
 from ..base.threads import one_blas_thread
+from .columns import error_option
 from .log import Log, uneven
 from .units import POSITION_UNITS, UNIT_OPTIONS
 
@@ -45,7 +46,7 @@ _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 """Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit."""
 
 _START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
-_COUNTS, _IN_A_SAMPLE, _WHOLE = 2**16, 0.1, 1e-2  # of a counter: range, motion in a sample relative to it, rounding
+_COUNTS, _WRAP = 2**16, 0.8  # of a counter that wraps once: its range; and share of its travel that a jump is of
 
 _USUAL = 0.98  # quantile of what is usual, beyond which are the samples that are looked for
 
@@ -145,21 +146,23 @@ def _hopeless(log: Log) -> Iterator[Finding]:
 
 
 def _wraps(log: Log) -> Iterator[Finding]:
-    """Find positions that jump by all that a counter counts, and go on after the jump as before it."""
-    for name, column in (("commanded", "x_d"), ("measured", "x_meas")):
-        signals = [getattr(one, column) for one in log.segments()]
-        x, jumps = np.concatenate(signals), np.concatenate([np.diff(one) for one in signals])
-        step = resolution(x)
-        counts = np.abs(jumps[np.isfinite(jumps)]) / step
-        beside = np.abs(counts - _COUNTS)
-        wraps, others = beside < _IN_A_SAMPLE * _COUNTS, counts[beside >= _IN_A_SAMPLE * _COUNTS]
-        is_counter = _travel(x) < _COUNTS * step and (np.abs(counts - np.round(counts)) < _WHOLE).all()
-        if wraps.any() and is_counter and beside[wraps].max() <= 2.0 * others.max(initial=0.0):
-            words = (
-                f"the {name} position jumps by {_COUNTS} of its smallest steps, in {wraps.sum()} samples: a counter of "
-                f"16 bits wraps; unwrap it before, with a period of {log.shown.words(_COUNTS * step, '.6g')}"
-            )
-            yield Finding("wraps", words, {"n": float(wraps.sum())}, refused=True)
+    """Find measured positions that jump by all that they reach, against the command's motion, and go on as before."""
+    steps = np.diff([log.x_d, log.x_meas], prepend=0.0)
+    steps[:, log.starts] = 0.0
+    travel = _travel(log.x_meas)
+    anew, far = (np.abs(one) > _WRAP * _travel(x) for one, x in zip(steps, (log.x_d, log.x_meas), strict=True))
+    moves = np.convolve(np.where(anew, 0.0, steps[0]), np.ones(5) / 5, "same")
+    at = np.flatnonzero(far & (moves != 0.0))  # at rest noise jumps to and fro
+    if not len(at) or np.nanmax(np.abs(steps[1, ~far])) > (1.0 - _WRAP) * travel:
+        return
+    period = float(np.median(np.abs(steps[1, at] - moves[at])))
+    once = abs(period / resolution(log.x_meas) / _COUNTS - 1.0) < 1.0 - _WRAP
+    if (len(at) > 1 or once) and np.mean(steps[1, at] * moves[at] < 0.0) > _WRAP:
+        words = (
+            f"the measured position jumps by all that it reaches, in {len(at)} samples, and goes on: a counter or an "
+            f"axis that begins anew; unwrap it before, with its period, about {log.shown.words(period)}"
+        )
+        yield Finding("wraps", words, {"n": float(len(at)), "period": period}, refused=True)
 
 
 def _unit(log: Log) -> Iterator[Finding]:
@@ -236,12 +239,25 @@ def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Find
     exchanged = following(filled, np.where(known, x_d, np.nan))
     noise = noise_std(x_d) / _travel(x_d), noise_std(filled) / _travel(x)
     better = _BETTER if noise[0] > _NOISIER * noise[1] else _BETTER_SWAPPED
-    if better * exchanged.left < given.left and exchanged.lag >= 1.0:
+    if "error" in log.columns:
+        x_of = "x_d" in log.columns
+        flipped = following(x_d, 2.0 * x_d - x) if x_of else following(2.0 * filled - x_d, x)
+        if _BETTER_SWAPPED * flipped.left < given.left and flipped.lag >= 1.0:  # much feed-forward leads a little
+            words = "the position that the error tells runs ahead: the error is the other way, its sign is flipped"
+            yield Finding(
+                "sign",
+                words,
+                evidence,
+                refused=True,
+                options=((error_option(log.columns["error"], -1), "the error's other sign"),),
+            )
+            return
+    elif better * exchanged.left < given.left and exchanged.lag >= 1.0:
         words = (
             f"x_d follows x, {exchanged.lag:.1f} samples later, and x does not follow x_d ({exchanged.left:.1e} and "
             f"{given.left:.1e} of the variance are left): the two columns are exchanged; read them the other way"
         )
-        swap = f"--x_d {shlex.quote(log.columns[1])} --x {shlex.quote(log.columns[0])}"
+        swap = f"--x_d {shlex.quote(log.columns['x'])} --x {shlex.quote(log.columns['x_d'])}"
         options: tuple[tuple[str, str], ...] = ((swap, "the two columns exchanged"),)
         if noise[1] > _NOISIER * noise[0]:  # then x is the measured one
             options = (*options, (f"--delay {-round(exchanged.lag) - 1}", "if x was recorded too early"))
@@ -272,7 +288,7 @@ _MEANINGS = {
     "sign": "the measured position moves opposite to the command: its sign is flipped, or the axis counts the other "
     "way; correct it where it is recorded, as your controller must do the same",
     "following error": "the column holds the following error, not the measured position: the command less it, or plus "
-    "it, is where a drive would be; name the column of the actual position (--x NAME), or write x_d − x into the file",
+    "it, is where a drive would be; name the column of the actual position (--x NAME), or this one as --error NAME",
     "velocity": "one of the columns holds a velocity, not a position; name another (--x_d NAME, --x NAME)",
 }
 

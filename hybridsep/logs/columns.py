@@ -1,15 +1,16 @@
 """Choice of a log's columns: which are time, commanded and measured position, in which units, at which rates."""
 
 import re
+import shlex
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
-from .names import ROLES, axes_of, has_word, known_names, signals_of
+from .names import ROLES, axes_of, has_word, known_names, lone_position, signals_of
 from .source import Block, Source
 from .text import is_number, stamp_kind
 from .times import COUNTED
@@ -35,6 +36,7 @@ class Column:
     name: str  # its name in the file
     unit: Unit  # unit of its numbers
     stated: bool  # whether the file or the caller stated the unit; otherwise it is SI
+    error: int = 0  # in the place of a position: 1 of commanded − measured, −1 of measured − commanded
 
 
 def choose_columns(
@@ -42,16 +44,17 @@ def choose_columns(
 ) -> dict[str, Column]:
     """Return the columns to read, by role.
 
-    ``columns`` has given names by role, which may leave out the unit that the file's have; ``unit`` is the positions';
-    ``axis`` one of several, by the format's name or the columns' names (``X1`` of ``X1_CommandPosition``);
-    ``time_needed`` whether a time column must be there.
+    ``columns`` has given names by role, which may leave out the unit that the file's have, and of an ``"error"``, which
+    is then in the place of a position; ``unit`` is the positions'; ``axis`` one of several, by the format's name or the
+    columns' names (``X1`` of ``X1_CommandPosition``); ``time_needed`` whether a time column must be there.
 
     LogError if a column is missing, occurs twice, or its unit is unknown or contradicts the given one.
     """
     for role in columns or ():
-        if role not in ROLES:
-            raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, got {brief(role)}")
+        if role not in (*ROLES, "error"):
+            raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, error, got {brief(role)}")
     given = dict(columns or {})
+    error = given.pop("error", None)
     chosen, remarks = _positions(source, given, axis)
     time = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
     if time is None and "t" not in given:
@@ -64,6 +67,7 @@ def choose_columns(
             time = _row_labels(source)
     if time and "t" not in given and not time_needed and plain_name(_stated(source, time)) in _COUNTS:
         time = None  # it counts samples, and the interval is given
+    told, sign = _told_by_error(source, chosen, given, error) if error is not None else ("", 0)
     if time is not None or "t" in given or time_needed:
         chosen = {"t": time, **chosen}
     speeds = [name for role, name in chosen.items() if role != "t" and name and has_word("velocity", name)]
@@ -78,7 +82,10 @@ def choose_columns(
             raise LogError(
                 f"{source.path}: column {brief(name)} must occur once, got it {source.names.count(name)} times"
             )
-        found[role] = _time(source, name) if role == "t" else _position(source, name, unit)
+        own = None if role == told and position_unit(_stated(source, name)) else unit
+        found[role] = _time(source, name) if role == "t" else _position(source, name, own)
+    if told:
+        found[told] = replace(found[told], error=sign)
     x_d, x = found["x_d"], found["x"]
     if x_d.unit.si != x.unit.si:
         raise LogError(
@@ -86,6 +93,31 @@ def choose_columns(
             f"{x.unit.name}; both must be lengths or both angles"
         )
     return found
+
+
+def _told_by_error(source: Source, chosen: dict[str, str | None], given: dict[str, str], error: str) -> tuple[str, int]:
+    """Put an error's column in the place of the position that is not there; return its role and the error's sign."""
+    if {"x_d", "x"} <= given.keys():
+        raise LogError(f"{source.path}: columns may name two of x_d, x and error, got all three")
+    if not any(chosen.values()):
+        chosen |= lone_position(source.names)
+    told = "x" if chosen["x_d"] and "x" not in given else "x_d"
+    name = _name(source, "error", error)
+    sign, name = (1, name) if name else (-1, _name(source, "error", error.removeprefix("-")))
+    chosen[told] = name
+    given[told] = error
+    of, way = brief(chosen["x_d" if told == "x" else "x"]), "+" if (told == "x_d") == (sign > 0) else "−"
+    source.remarks = [
+        *source.remarks,
+        f"{told} = {of} {way} {brief(name)}, an error that is "
+        f"{'commanded − measured' if sign > 0 else 'measured − commanded'}; the other way: {error_option(error, -1)}",
+    ]
+    return told, sign
+
+
+def error_option(name: str, sign: int = 1) -> str:
+    """Return the option that names an error's column, with its sign, or with the other one."""
+    return f"--error={shlex.quote(name if sign > 0 else f'-{name}'.removeprefix('--'))}"
 
 
 def signal_columns(source: Source, columns: Mapping[str, Column]) -> dict[str, Column]:
@@ -217,8 +249,11 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     errors, speeds = ([name for name in source.names if has_word(kind, name)] for kind in ("error", "velocity"))
     instead = "; velocities are none: record positions" if speeds and not errors and set(names) != {"t"} else ""
     if errors and set(names) != {"t"}:
-        what = "an error alone tells no command" if {"x_d", "x"} <= names.keys() else "or write it into the file"
-        instead = f"; {what}: x = x_d − {brief(errors[0])}, plus where that is x − x_d"
+        if {"x_d", "x"} <= names.keys() and not lone_position(source.names):
+            instead = "; an error alone tells neither position: record one beside it"
+        else:
+            instead = f"; or the error beside one position, commanded − measured: {error_option(errors[0])} (where it "
+            instead += f"is measured − commanded {error_option(errors[0], -1)}), in Python columns={{'error': NAME}}"
     return LogError(f"{source.path}: {there}; name {it}: {options}{of_python}{instead}")
 
 

@@ -54,7 +54,7 @@ _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
     (
         "JSON of another kind than Siemens Capture",
         (b'{"', b"{ ", b"{\n", b"{\r", b"[{", b"[[", b"[\n"),
-        _PANDAS.format("json"),
+        _PANDAS.format("json") + " (lines=True where each line is a row)",
     ),
     ("compressed", (b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf"), "unpack it, or compress it by gzip"),
     ("an Excel workbook, or another zip archive", (b"PK\x03\x04",), f"{_SAVE} in Excel, or unpack it"),

@@ -68,8 +68,8 @@ class Log:
         Samples that were read from the file; as many as there are, if left out.
     T_recorded : float
         Interval between them, s; ``T_s`` if left out.
-    columns : tuple of str
-        Names of the columns of the commanded and of the measured position.
+    columns : mapping of str to str
+        Names of the columns by role, ``"x_d"`` and ``"x"``, or one of them and ``"error"``.
     signals : mapping of str to (n,) array, m or rad
         What the controller itself says beside the pair, as far as its recorder has it, by the names of
         :data:`hybridsep.logs.names.SIGNALS`: ``"planned_position"``, ``"following_error"``.
@@ -87,7 +87,7 @@ class Log:
     file_unit: str = ""
     n_recorded: int = 0
     T_recorded: float = 0.0
-    columns: tuple[str, str] = ("x_d", "x")
+    columns: Mapping[str, str] = field(default_factory=lambda: {"x_d": "x_d", "x": "x"})
     signals: Mapping[str, Array] = field(default_factory=dict)
 
     @property
@@ -124,7 +124,8 @@ def read_log(
     columns : mapping, optional
         The file's names of ``"t"``, ``"x_d"`` and ``"x"``, the measured position, where they are others, such as
         ``{"x_d": "qg", "x": "qm"}``; units in them may be left out. Without a name for ``"x"``, ``x_meas`` is read
-        where the file has it.
+        where the file has it. An ``"error"``, commanded − measured, tells the position of the two that the file does
+        not have; ``"-name"`` is one that is measured − commanded.
     unit : str, optional
         Unit of the positions: m, mm, um, nm, in, or rad, mrad, urad, deg, rev for a rotary axis, or a multiple of
         one, ``0.1um``, such as an encoder's count. If left out, that in the columns' names (``x [mm]``), or m.
@@ -155,7 +156,8 @@ def read_log(
         raise LogError(f"a log is a file, a mapping of columns or a table, got {got}; x beside x_d?")
     path = source.path
     chosen = choose_columns(source, columns, unit, axis=axis, time_needed=given is None)
-    source.commanded, source.measured = chosen["x_d"].name, chosen["x"].name
+    if not chosen["x_d"].error:  # else a command's sample is missing with either of them
+        source.commanded, source.measured = chosen["x_d"].name, chosen["x"].name
     _check_twins(source, chosen)
     chosen = {**chosen, **signal_columns(source, chosen)}
     block, resampling = side_by_side(source, chosen, resample=resample)
@@ -164,6 +166,10 @@ def read_log(
     own = {what: chosen[what].unit.factor * read[what] for what in SIGNALS if what in chosen}
     signals = {what: values for what, values in own.items() if not np.isnan(values).all()}
     x_d, x_meas = (chosen[role].unit.factor * read[role] for role in ("x_d", "x"))
+    if (sign := chosen["x"].error) != 0:
+        x_meas = x_d - sign * x_meas
+    elif (sign := chosen["x_d"].error) != 0:
+        x_d = x_meas + sign * x_d
     time = chosen.get("t")
     if time is None:
         T_s = given or 0.0  # given, as there is no time
@@ -177,7 +183,7 @@ def read_log(
         file_unit=chosen["x_d"].unit.name,
         n_recorded=len(x_d),
         T_recorded=times.T_s,
-        columns=(chosen["x_d"].name, chosen["x"].name),
+        columns=dict(_as_given(role, chosen[role]) for role in ("x_d", "x")),
         signals=signals,
     )
     remarks = [*source.remarks, resampling, repeats, *_guessed(source, chosen, columns or {}), *source.notes()]
@@ -211,7 +217,8 @@ def _checked(path: Path, block: Block, columns: Mapping[str, Column]) -> dict[st
     if n < 2:
         raise LogError(f"{path}: a log needs at least 2 samples, got {n or 'none'}")
     for role, column in columns.items():
-        wrong = ~np.isfinite(read[role]) if role in ("t", "x_d") else np.isinf(read[role])
+        may_miss = role not in ("t", "x_d") and not columns["x_d"].error
+        wrong = np.isinf(read[role]) if may_miss else ~np.isfinite(read[role])
         if wrong.any():
             i = int(np.argmax(wrong))
             raise LogError(f"{path}, {block.where(i)}: column {brief(column.name)} must be finite, got {read[role][i]}")
@@ -238,17 +245,27 @@ def _without_repeats(read: dict[str, Array]) -> tuple[dict[str, Array], str]:
 
 
 def _check_alternation(path: Path, t: Array, x_d: Array, x: Array) -> None:
-    """Raise LogError if rows of k axes follow each other: times repeat, and positions move far less over k rows."""
+    """Raise LogError if rows of k axes follow each other: times repeat, and positions move far less over k rows.
+
+    Those of one that repeats its motion while a coarse time stays move over 2 rows about twice as far as over 1.
+    """
     k = round(len(t) / (np.count_nonzero(np.diff(t)) + 1))
-    moved = [[np.nansum(np.abs(one[n:] - one[:-n])) for n in (k, 1)] for one in (x_d, x)]
-    if 1 < k < len(t) and all(over_k < 0.2 * over_one for over_k, over_one in moved):
+    moved = [[np.nansum(np.abs(one[n:] - one[:-n])) for n in (k, 1, 2)] for one in (x_d, x)]
+    if 1 < k < len(t) and all(
+        over_k < 0.2 * over_1 and (k == 2 or over_1 > 0.6 * over_2) for over_k, over_1, over_2 in moved
+    ):
         raise LogError(f"{path}: rows of {k} axes follow each other; write those of one into a file of their own")
+
+
+def _as_given(role: str, column: Column) -> tuple[str, str]:
+    """Return a position's role and name, of an error in its place ``"error"`` and the name with its sign."""
+    return ("error", f"{'-' if column.error < 0 else ''}{column.name}") if column.error else (role, column.name)
 
 
 def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, str]) -> Iterator[str]:
     """Yield a remark if a column of positions was recognised by a name other than the library's own."""
     known = {"x_d", "x", "x_meas", *(name for pair in source.axes.values() for name in pair)}
-    roles = [role for role in ("x_d", "x") if role not in given]
+    roles = [role for role in ("x_d", "x") if role not in given and "error" not in given]
     if any(stated_unit(columns[role].name)[0] not in known for role in roles):
         x_d, x = brief(columns["x_d"].name), brief(columns["x"].name)
         yield (
@@ -323,15 +340,16 @@ def whole_turns(given: Log) -> tuple[Log, str]:
 
 
 def _turn_jumps(x: Array) -> Indices:
-    """Return the samples at which a position, NaN where it is missing, is one turn away from where it was before."""
+    """Return the samples at which a position, NaN where it is missing, is all its turns away from where it was."""
     known = np.flatnonzero(np.isfinite(x))
     steps = np.diff(x[known])
-    if len(known) < 2 or np.ptp(x[known]) > 1.05 * _TURN:  # one turn with its noise
+    turns = _TURN * max(round(float(np.ptp(x[known])) / _TURN), 1) if len(known) > 1 else 0.0
+    if not turns or np.ptp(x[known]) > turns + 0.05 * _TURN:  # whole turns with their noise
         return np.empty(0, dtype=np.intp)
     far = np.abs(steps) > _TURN / 2
     usual = float(np.abs(steps[~far]).max(initial=0.0))
-    off = np.abs(np.abs(steps) - _TURN)
-    return np.asarray(known[1:][far & (off <= 3.0 * usual) & (off < _TURN / 2)])  # a jump is a turn and a step
+    off = np.abs(np.abs(steps) - turns)
+    return np.asarray(known[1:][far & (off < 3.0 * usual) & (off < _TURN / 2)])  # a jump is a turn and a step
 
 
 def _error(x_d: Array, x_meas: Array) -> float:

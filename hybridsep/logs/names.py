@@ -34,8 +34,21 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 
 _SOLL, _IST = {"sollposition", "solllage", "lagesollwert"}, {"istposition", "istlage", "lageistwert"}
 _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "sp", "des", "desired", "target"}
-_COMMANDED |= {"commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"} | _SOLL
-_MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "pv", "ist"} | _IST
+_COMMANDED |= {"goal", "commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"} | _SOLL
+_MEASURED = {
+    "present",
+    "act",
+    "actual",
+    "meas",
+    "measured",
+    "measurement",
+    "fb",
+    "feedback",
+    "enc",
+    "encoder",
+    "pv",
+    "ist",
+} | _IST
 _MEASURED |= {"mesure", "istwert"}
 _ESTIMATED = {"estimate", "estimated"}  # measured where nothing else is
 _POSITION = {"pos", "position", "positions", "lage", "angle", "pl", "pctrl", "pulses"} | _SOLL | _IST
@@ -43,13 +56,19 @@ _FILLING = {"axis", "value", "values", "data", "state", "states", "current"}
 _SENT = {"control", "input"}  # commanded beside a word for the position, else a controller's output
 _VELOCITY = {"vel", "velo", "velocity", "velocities", "speed", "speeds", "geschwindigkeit"}
 _ERROR = {"error", "err", "errors", "diff", "posdiff", "deviation", "droop", "schleppfehler", "schleppabstand"}
+_ERROR |= {"fe", "ferr", "ferror", "poserr"}
 _NO_POSITION = _VELOCITY | _ERROR | {"acc", "acceleration", "accelerations", "jerk", "torque", "frequency"}
 _TIME = {"time", "timestamp", "zeit", "zeitstempel", "temps"}
 """Words within names, in small letters; what is left of a name beside those of positions and what fills is the axis."""
 
-_SHORT = {"rpos": "ref pos", "fpos": "fb pos", "pcmd": "pos cmd", "posf": "pos fb", "s": "pos"}
-_WHOLE = re.compile(r"(?<![a-z])(rpos|fpos|pcmd|posf|^s(?=[ _](?:noml|act)))(?![a-z])|\(?0x[\da-f]+\)?", re.IGNORECASE)
-"""Whole words of ACS, Fanuc and Heidenhain that stand for two; and numbers of CANopen's objects, which say nothing."""
+_SHORT = {"rpos": "ref pos", "fpos": "fb pos", "dpos": "ref pos", "mpos": "fb pos", "tpos": "ref pos"}
+_SHORT |= {"apos": "estimate pos", "pcmd": "pos cmd", "posf": "pos fb", "s": "pos", "_rp": "ref pos ", "_tp": "fb pos "}
+_WHOLE = re.compile(
+    r"(?<![a-z])([rfdmta]pos|pcmd|posf|^s(?=[ _](?:noml|act)))(?![a-z])|^_[rt]p(?=[a-hw-z]$)|\(?0x[\da-f]+\)?",
+    re.IGNORECASE,
+)
+"""Whole words of ACS, Trio, Technosoft (``APOS``, in ACS a command, is measured where nothing else is), Fanuc,
+Heidenhain and Galil that stand for two; and numbers of CANopen's objects, which say nothing."""
 
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|\W")
 _POS = re.compile(r"(?<=[a-z\d])(pos)(?![a-z])", re.IGNORECASE)
@@ -73,19 +92,26 @@ def n_known(names: Sequence[str]) -> int:
     return sum(bool(known_names(role, names)) for role in ROLES) + 2 * len(axes_of(names))
 
 
-def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Return commanded and measured position by axis: ``X1_CommandPosition``, ``X1_ActualPosition`` of ``X1``."""
+_ByAxis = dict[str, str]
+
+
+def _by_words(names: Sequence[str]) -> tuple[_ByAxis, _ByAxis, tuple[list[str], list[str]]]:
+    """Return commanded and measured positions by axis, and those of either kind that have a word for the position."""
     commanded: dict[str, str] = {}
     measured: dict[str, str] = {}
     estimated: dict[str, str] = {}
     positions: dict[str, str] = {}  # of columns that say nothing else, joint_pos_1 beside joint_pos_target_1
     whole: dict[str, list[str]] = {"x_d": [], "x": []}
     # That of a whole move or of another instant, where there is another
-    for name in sorted(names, key=lambda one: any(word in one.lower() for word in ("target", "planned", "nominal"))):
+    for name in sorted(
+        names, key=lambda one: any(word in one.lower() for word in ("target", "tpos", "planned", "nominal", "goal"))
+    ):
         if column := _COLUMN.search(stated_unit(name)[0]):  # of a matrix that is called x_d
             known = [_spelling(name[: column.start()]) in _NAMES[role] for role in ("x_d", "x")]
             if any(known):
                 (commanded if known[0] else measured).setdefault(column[1], name)
+                if known[0] and (own := name.replace("_d", "", 1)) != name and own in names:  # a robot's q beside q_d
+                    measured.setdefault(column[1], own)
                 continue
         words, axis = {token.lower() for token in _tokens(name)}, _axis(name)
         is_position = not words.isdisjoint(_POSITION)
@@ -107,13 +133,25 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     plain = {name: _COLUMN.sub(r"_\1", stated_unit(name)[0]) for name in names[::-1]}
     bare = {axis: name for name, axis in plain.items() if axis and axis in commanded}  # q and q_des
     measured = {**estimated, **bare, **positions, **measured}
+    return commanded, measured, (whole["x_d"], whole["x"] or list(positions.values()))
+
+
+def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return commanded and measured position by axis: ``X1_CommandPosition``, ``X1_ActualPosition`` of ``X1``."""
+    commanded, measured, only = _by_words(names)
     found = {axis: (x_d, measured[axis]) for axis, x_d in commanded.items() if axis in measured}
     # A compensation is added to what enters the position loop; what was planned is another instant's
     found = {axis: (signals_of(names, x).get("loop_command", x_d), x) for axis, (x_d, x) in found.items()}
-    only = whole["x_d"], whole["x"] or list(positions.values())
     if not found and [len(names) for names in only] == [1, 1]:  # whatever their axis
         return {"": (only[0][0], only[1][0])}
     return found
+
+
+def lone_position(names: Sequence[str]) -> dict[str, str]:
+    """Return the only commanded position by its role, or the only measured one; empty where there are none."""
+    commanded, measured, _ = _by_words(names)
+    found = {"x_d": list(commanded.values())} if commanded else {"x": list(measured.values())}
+    return {role: one[0] for role, one in found.items() if len(one) == 1}
 
 
 def signals_of(names: Sequence[str], measured: str) -> dict[str, str]:

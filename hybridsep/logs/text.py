@@ -32,10 +32,11 @@ _BLOCK = 10_000  # lines that are converted at once
 
 _COMMENTS = ("#", "%", "//", "!")  # beginnings of a comment line
 
-_DELIMITERS = (";", "\t", ",", None)  # delimiters by precedence; None is blanks
+_DELIMITERS = (";", "\t", ",", "|", None)  # delimiters by precedence; None is blanks
 _UNIT_ROWS = ("unit", "units", "einheit", "einheiten", "y_unit_label")  # first cells of rows of units
 _NO_UNITS = ("", "-", "1", "[-]")  # entries of a row of units where a column has none
 _BLANK = -math.inf  # stands for a blank cell of the command until it is filled
+_APART = 0.9  # share of rows with one of the two positions from which on channels have times of their own
 
 _MISSING = re.compile(
     r"[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?n/a|<na>|null|none|-{1,3}", re.IGNORECASE
@@ -75,7 +76,6 @@ _STAMP = re.compile(
 """A time of day, with a date before it and a zone after it or without."""
 
 _GZIP = b"\x1f\x8b"
-_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _DAMAGE = (gzip.BadGzipFile, EOFError, zlib.error)
 
 
@@ -92,10 +92,10 @@ class _Table:
 
 
 class TextSource(Source):
-    """Text with a line of column names, then numbers, delimited by comma, semicolon, tab or blanks.
+    """Text with a line of column names, then numbers, delimited by comma, semicolon, tab, bar or blanks.
 
     Preamble, comments and a row of units are skipped, decimal commas are read; columns of timestamps become seconds.
-    UTF-8, UTF-16 with a byte-order mark or Latin-1, plain or in gzip. A blank cell of the command is as before, as
+    UTF-8, UTF-16 or Latin-1, plain or in gzip. A blank cell of the command is as before, as
     controllers' traces write it.
     """
 
@@ -145,8 +145,8 @@ class TextSource(Source):
 
     @staticmethod
     def recognises(head: bytes) -> bool:
-        """Return whether there is no byte 0, or a mark of gzip or UTF-16."""
-        return head.startswith((_GZIP, *_UTF_16)) or b"\0" not in head
+        """Return whether there is no byte 0, or it is gzip or UTF-16."""
+        return head.startswith(_GZIP) or b"\0" not in head or _encoding(head).startswith("utf-16")
 
     def read(self, names: Sequence[str]) -> Block:
         """Return the columns ``names``."""
@@ -170,12 +170,17 @@ class TextSource(Source):
             since = past_midnights(columns[name], 86_400.0 * _SECOND)
             columns[name] = (since - since[:1]) / _SECOND
         if self.commanded in columns:
-            columns[self.commanded] = self._filled(columns[self.commanded], numbers)
+            columns[self.commanded] = self._filled(columns[self.commanded], columns.get(self.measured), numbers)
         return Block([np.ascontiguousarray(columns[name]) for name in names], lambda i: f"line {numbers[i]}")
 
-    def _filled(self, column: Array, numbers: Sequence[int]) -> Array:
-        """Return the command with what is blank as before, which is noted."""
+    def _filled(self, column: Array, measured: Array | None, numbers: Sequence[int]) -> Array:
+        """Return the command with what is blank as before, which is noted; LogError if it is where x is measured."""
         blank = column == _BLANK
+        if measured is not None and blank.any() and (blank != np.isnan(measured)).mean() > _APART:
+            raise LogError(
+                f"{self.path}: rows have either {brief(self.commanded)} or {brief(self.measured)}: channels with times "
+                "of their own; export them with a common time, or fill the gaps, as interpolate() of pandas does"
+            )
         if blank[:1].any():
             raise LogError(
                 f"{self.path}, line {numbers[0]}: column {brief(self.commanded)} must be a number, got nothing"
@@ -338,8 +343,11 @@ def split(line: str, delimiter: str | None) -> list[str]:
 
 def _encoding(head: bytes) -> str:
     """Return the encoding of a text that begins with these bytes."""
-    if head.startswith(_UTF_16):
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
+    for name, zeros, others in (("utf-16-le", head[1::2], head[::2]), ("utf-16-be", head[::2], head[1::2])):
+        if b"\0" not in others and 2 * zeros.count(b"\0") > len(zeros):  # without its mark
+            return name
     try:
         codecs.getincrementaldecoder("utf-8-sig")().decode(head)
     except UnicodeDecodeError:

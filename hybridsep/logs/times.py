@@ -9,10 +9,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ..base.errors import LogError, brief
 from ..base.signals import Array, Indices
+from .units import time_unit
 
 _DAY = 86_400.0
 
-_CLOCKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": _DAY}
+_CLOCKS = {"ms": 1e-3, "us": 1e-6, "100 ns": 1e-7, "ns": 1e-9, "min": 60.0, "d": _DAY}
 """Units, s, that a column of times may be in which states none and is not in seconds."""
 
 _PLAUSIBLE = (2e-6, 0.5)  # intervals, s, of a log of an axis; beyond, a unit of times that is not stated is unknown
@@ -118,7 +119,8 @@ def _rows(path: Path, name: str, t: Array, given: float | None, remarks: tuple[s
     steps = np.diff(t)
     resolution = float(np.median(steps[steps > 0.0]))
     usual = steps[(steps >= 0.0) & (steps <= 2.0 * resolution)]
-    mean = float(usual.mean())
+    changes = np.flatnonzero(usual > 0.0)
+    mean = float(usual[changes[0] + 1 : changes[-1] + 1].mean() if len(changes) > 1 else usual.mean())
     about = _rounded(mean, resolution / max(float(usual.sum()), resolution))
     if given is None:
         raise LogError(
@@ -137,14 +139,17 @@ def _rows(path: Path, name: str, t: Array, given: float | None, remarks: tuple[s
 def _unknown_unit(path: Path, name: str, first: float, interval: float, *, counts: bool) -> LogError:
     """Return the error of times that state no unit and are not in seconds, with the intervals that they may have."""
     units = [unit for unit, size in _CLOCKS.items() if _PLAUSIBLE[0] <= size * interval <= _PLAUSIBLE[1]]
-    since = next((unit for unit in units if 3e8 < first * _CLOCKS[unit] < 1e10), "")  # 1980 to 2286
+    latest = {"100 ns": 1e11, "d": 1e11}  # since 1601 or 1 in Windows, 1900 in Excel, 0 in MATLAB
+    since = next((unit for unit in units if 3e8 < first * _CLOCKS[unit] < latest.get(unit, 1e10)), "")  # 1980 to 2286
     units = [since] if since else [name] if name in _CLOCKS else units
-    guess = f", or a time in {units[0]}{' since 1970' if since else ''}" if units else ""
+    epoch = " since 1970" if since and since not in latest else ""
+    guess = f", or a time in {units[0]}{epoch}" if units else ""
     hint = f"--T_s {interval * _CLOCKS[units[0]]:.4g}" if units else ""
+    named = units[0] if units else "ms"
+    how = f", or name its unit in the file, '{name:.60} [{named}]'" if time_unit(named) else ""
     says = "counts samples: it is an index" if counts else f"has an interval of {interval:.6g}, no axis's in s"
     return LogError(
-        f"{path}: column {brief(name)} {says}{guess}; give T_s ({hint or '--T_s'}), or name its unit in the file, "
-        f"'{name:.60} [{units[0] if units else 'ms'}]'",
+        f"{path}: column {brief(name)} {says}{guess}; give T_s ({hint or '--T_s'}){how}",
         [(hint, "the interval between the rows, s")] if hint else (),
     )
 

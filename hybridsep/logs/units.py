@@ -115,12 +115,12 @@ def plain_name(text: str) -> str:
     return _SPELLINGS.get(text, text)
 
 
-def position_unit(text: str) -> Unit | None:
+def position_unit(text: str, known_units: Mapping[str, Unit] = POSITION_UNITS) -> Unit | None:
     """Return the unit of a position of that spelling, or a multiple of one, ``0.1 um``; None if there is none."""
-    unit, multiple = POSITION_UNITS.get(plain_name(text)), _MULTIPLE.match(text)
+    unit, multiple = known_units.get(plain_name(text)), _MULTIPLE.match(text)
     if unit is not None or multiple is None:
         return unit
-    unit, times = POSITION_UNITS.get(plain_name(multiple["unit"])), float(multiple["times"])
+    unit, times = known_units.get(plain_name(multiple["unit"])), float(multiple["times"])
     known = unit is not None and 0.0 < times * unit.factor < math.inf
     return Unit(f"{times:g} {unit.name}", unit.si, times * unit.factor) if unit is not None and known else None
 
@@ -138,8 +138,8 @@ def si_factor(own: str) -> Callable[[str], float]:
 
 
 def time_unit(text: str) -> Unit | None:
-    """Return the unit of a time of that spelling, None if there is none."""
-    return TIME_UNITS.get(plain_name(text))
+    """Return the unit of a time of that spelling, or a multiple of one, ``100 ns``; None if there is none."""
+    return position_unit(text, TIME_UNITS)
 
 
 def stated_unit(name: str) -> tuple[str, str]:

@@ -308,13 +308,14 @@ class LogSection(Section):
     t: str | None = line_entry(None)
     x_d: str | None = line_entry(None)
     x: str | None = line_entry(None)
+    error: str | None = line_entry(None)
     unit: str | None = line_entry(None)
     axis: str | None = line_entry(None)
 
     @property
     def columns(self) -> dict[str, str]:
         """Names of the columns by role."""
-        return {name: value for name, value in self.table.items() if name in ("t", "x_d", "x")}
+        return {name: value for name, value in self.table.items() if name in ("t", "x_d", "x", "error")}
 
 
 def _own(*several: type[PredictorSettings | CompensatorSettings]) -> dict[str, Parameter]:

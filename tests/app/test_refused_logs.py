@@ -61,7 +61,7 @@ def test_a_refusal_names_its_file_and_itself_once(
 
 @pytest.mark.parametrize("scale", [1e3, 6e4])  # refused by the checks, and by the reader
 def test_a_log_without_units_is_refused_with_lines_to_paste(tmp_path: Path, hybridsep: Run, scale: float) -> None:
-    log = write_log(tmp_path / "joint 3.csv", header="t,goal,present", scale=scale)
+    log = write_log(tmp_path / "joint 3.csv", header="t,one,other", scale=scale)
     given = ("fit", log, "--x_d", "goal", "--x", "present")
     err = hybridsep.refused(*given, "--out", tmp_path / "fit")
     lines = [line.strip() for line in err.splitlines() if line.startswith("  hybridsep ")]
@@ -111,7 +111,7 @@ def test_channels_are_listed(tmp_path: Path, hybridsep: Run) -> None:
     listed = {one["name"]: one for one in json.loads(out)[str(path)]}
     assert listed["x"] == {"name": "x", "unit": "m", "role": "x"}
     assert [one.name for one in tmp_path.iterdir()] == ["log.csv"]
-    odd = write_log(tmp_path / "odd.csv", n=20, header="t,goal,present")
+    odd = write_log(tmp_path / "odd.csv", n=20, header="t,one,other")
     out = hybridsep.done("fit", odd, "--list-channels")
     words = "none is read as the commanded and measured position; name it: hybridsep fit "
     assert f"{words}{odd} --x_d NAME --x NAME" in out

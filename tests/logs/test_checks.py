@@ -243,6 +243,10 @@ def counted(x: Array) -> Array:
     return np.asarray(step * (np.round(x / step) % 2**16))
 
 
+def in_modulo(x: Array) -> Array:
+    return np.asarray(np.mod(x, 0.4 * np.ptp(moves().x_d)))
+
+
 FAULTS: dict[str, tuple[str, Callable[[Log], Log]]] = {
     "flipped": ("sign", lambda log: replace(log, x_meas=-log.x_meas)),
     "mm for m": ("scale", lambda log: replace(log, x_meas=1e3 * log.x_meas)),
@@ -257,6 +261,7 @@ FAULTS: dict[str, tuple[str, Callable[[Log], Log]]] = {
     "another axis": ("hardly follows", lambda log: replace(log, x_meas=generated_log(7).x_d)),
     "one column": ("same column", lambda log: replace(log, x_meas=log.x_d)),
     "a counter wraps": ("wraps", lambda log: replace(log, x_meas=counted(log.x_meas))),
+    "a modulo axis": ("wraps", lambda log: replace(log, x_d=in_modulo(log.x_d), x_meas=in_modulo(log.x_meas))),
     "no command": ("no motion", lambda log: replace(log, x_d=np.zeros_like(log.x_d))),
     "no motion": ("no motion", lambda log: replace(log, x_meas=np.zeros_like(log.x_d))),
     "short": ("too short", lambda log: log_of(log.x_d[150:240], log.x_meas[150:240], log.T_s)),
@@ -285,6 +290,28 @@ def test_columns_that_mean_something_else_are_refused(fault: str, good: Callable
     assert names(log) == [name]
     with pytest.raises(LogError, match=f"log.csv: {name}: "):
         checked(log)
+
+
+@pytest.mark.parametrize(("kept", "sign"), [("x_d", 1.0), ("x_d", -1.0), ("x_meas", 1.0), ("x_meas", -1.0)])
+def test_an_error_tells_the_other_position(kept: str, sign: float) -> None:
+    log = moves()
+    table = {
+        "pos_cmd" if kept == "x_d" else "pos_act": getattr(log, kept),
+        "lag_um": 1e6 * sign * (log.x_d - log.x_meas),
+    }
+    right, wrong = ("lag_um", "-lag_um")[:: int(sign)]
+    found = read_log(table, columns={"error": right}, T_s=log.T_s)
+    np.testing.assert_allclose((found.x_d, found.x_meas), (log.x_d, log.x_meas), atol=1e-15)
+    assert f"the other way: --error={wrong}" in found.remarks[0]
+    assert np.array_equal(read_log(table, columns=found.columns, T_s=log.T_s).x_d, found.x_d)
+    with pytest.raises(LogError, match=f"sign: the position that .* runs ahead: .*--error={right}"):
+        checked(read_log(table, columns={"error": wrong}, T_s=log.T_s))
+    table["lag_um"][9] = np.nan
+    if kept == "x_d":
+        assert np.isnan(read_log(table, columns={"error": right}, T_s=log.T_s).x_meas[9])
+    else:
+        with pytest.raises(LogError, match=r"sample 10 .* column 'lag_um' must be finite, got nan"):
+            read_log(table, columns={"error": right}, T_s=log.T_s)
 
 
 def test_jumps_are_no_counter_that_wraps() -> None:

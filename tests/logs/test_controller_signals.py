@@ -52,7 +52,7 @@ def test_signals_of_a_capture_and_of_a_table(tmp_path: Path) -> None:
         read_log(data, axis="1", unit="mm", T_s=T_S),
         read_log(write(tmp_path / "log.csv", data), unit="mm", T_s=T_S),
     ):
-        assert log.columns == ("CTRL_POS|1", "ENC_POS|1")
+        assert tuple(log.columns.values()) == ("CTRL_POS|1", "ENC_POS|1")
         assert tuple(log.signals) == SIGNALS
         for what, name in zip(SIGNALS, ("DES_POS|1", "CTRL_POS|1", "CTRL_DIFF|1", "CONT_DEV|1"), strict=True):
             np.testing.assert_allclose(log.signals[what], 1e-3 * data[name], rtol=1e-12)
@@ -115,7 +115,7 @@ def test_without_the_command_of_the_loop_the_delay_is_all_that_is_known() -> Non
     log = read_log({name: data[name] for name in ("DES_POS|1", "ENC_POS|1")}, unit="mm", T_s=T_S)
     found = controller_of([log])
     assert found is not None
-    assert (log.columns[0], found.delay, found.look_ahead) == ("DES_POS|1", 7, None)
+    assert (log.columns["x_d"], found.delay, found.look_ahead) == ("DES_POS|1", 7, None)
     assert found.lines(log.shown, 50)[-1].endswith("CTRL_POS would say it")
     assert controller_of([log, read_log({"x_d": log.x_d, "x": log.x_meas}, T_s=T_S)]) is None
 

@@ -226,7 +226,9 @@ OF_TOOLS = (
     "Position command | Position actual | Position command velocity | Position actual velocity; "
     "q_des | q | current_setpoint | current_feedback; Y_cmd | Y_act | Y_estimate | Y_planned; "
     "Z_ref | Z_act | Z_nominal; reference_position | position | estimated_position; q_des({}) | q({}) @ 1; "
-    "q_des[{}] | q[{}] @ 1; x_d({}) | x({}) @ 1"
+    "q_des[{}] | q[{}] @ 1; x_d({}) | x({}) @ 1; q_d[{}] | q[{}] | dq[{}] @ 2; _RPX | _TPX | _TEX; "
+    "TPOS | APOS | POSERR; RPOS(X) | FPOS(X) | APOS(X) | TPOS(X); DPOS AXIS(0) | MPOS AXIS(0) | FE AXIS(0); "
+    "goal_position | present_position | present_velocity"
 )
 """Commanded and measured position, then others, as controllers, drives and recorders call them; and the axis."""
 
@@ -239,7 +241,7 @@ def test_names_of_robots_and_controllers(one: str) -> None:
     for order in (list(data), list(data)[::-1]):
         log = read_log({name: data[name] for name in order}, T_s=1e-3, axis=axis, unit="mm")
         np.testing.assert_allclose((log.x_d, log.x_meas), (n * X_D, n * X), rtol=1e-15)
-        assert log.columns == tuple(name.format((axis or "").strip("aJ")) for name in names[:2])
+        assert tuple(log.columns.values()) == tuple(name.format((axis or "").strip("aJ")) for name in names[:2])
 
 
 def test_ticks_need_no_unit_where_the_interval_is_given() -> None:

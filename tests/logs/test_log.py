@@ -107,7 +107,7 @@ def time_at(i: int, value: float) -> Array:
         (1e6 + np.arange(50, dtype=np.float32) / 16, r"time 't' is rounded too coarsely, 0 % .*, about 0\.062 s"),
         (np.arange(50) * 4.0, r"has an interval of 4, no axis's in s, or a time in ms; give T_s"),
         (1.7e12 + np.arange(50), r"it is an index, or a time in ms since 1970; give T_s \(--T_s 0.001\), or"),
-        (46_000 + np.arange(50) / 8_640_000, r"an interval of 1\.15741e-07, .* in d since 1970; .*\(--T_s 0.01\)"),
+        (46_000 + np.arange(50) / 8_640_000, r"an interval of 1\.15741e-07, .* in d; give T_s \(--T_s 0.01\)$"),
     ],
 )
 def test_bad_time(tmp_path: Path, t: Array, message: str) -> None:
@@ -247,12 +247,20 @@ def test_an_index_with_a_gap_takes_the_given_interval(tmp_path: Path) -> None:
     ("t", "T_s"),
     [
         (np.arange(N) // 10 * 0.01, 1e-3),
+        (np.arange(N) // 200 * 0.2, 1e-3),
         (86_400.0 + (1e-3 * np.arange(N)).astype(np.float32), 1e-3),
         (1.7e12 + np.arange(N), 1e-3),
         (1.7e9 * 1e3 + 4.0 * np.arange(N), 4e-3),
         (np.arange(N) * 2.0, 2e-3),
     ],
-    ids=["two decimals", "single precision", "ms since 1970", "ms since 1970 at 250 Hz", "ms at 500 Hz"],
+    ids=[
+        "two decimals",
+        "three times",
+        "single precision",
+        "ms since 1970",
+        "ms since 1970 at 250 Hz",
+        "ms at 500 Hz",
+    ],
 )
 def test_what_times_do_not_tell_is_asked_for(tmp_path: Path, t: Array, T_s: float) -> None:
     """Times that are rounded, or whose unit is not stated, with the line to paste, and what it gives."""
@@ -345,12 +353,19 @@ def test_resampled_by_an_option(tmp_path: Path) -> None:
     assert read(tmp_path, t, resample=True).remarks == ()
 
 
+def test_a_motion_that_repeats_while_a_coarse_time_stays() -> None:
+    k = np.arange(600)
+    for n in (10, 100):
+        x_d, x = (np.sin(2 * np.pi * (k - lag) / n) for lag in (0, 1))
+        assert read_log({"t": 1e-3 * n * (k // n), "x_d": x_d, "x": x}, T_s=1e-3).T_s == 1e-3
+
+
 @pytest.mark.parametrize("unit", ["rev", "deg"])
 def test_whole_turns_are_unwrapped(tmp_path: Path, unit: str) -> None:
-    turn = {"rev": 1.0, "deg": 360.0}[unit]
+    turn, modulo = {"rev": (1.0, 1.0), "deg": (360.0, 720.0)}[unit]
     turns = np.cumsum(np.linspace(0.0, 0.02, N))
     x_d, x = turn * turns, turn * np.concatenate((np.zeros(3), turns[:-3]))
-    data = {"t": 1e-3 * np.arange(N), f"x_d [{unit}]": x_d % turn, f"x [{unit}]": x % turn}
+    data = {"t": 1e-3 * np.arange(N), f"x_d [{unit}]": x_d % modulo, f"x [{unit}]": x % modulo}
     log = read_log(write(tmp_path / "log.npz", data))
     np.testing.assert_allclose([log.x_d, log.x_meas], 2 * np.pi / turn * np.array([x_d, x]), atol=1e-9)
     assert "jumps of a whole turn, the first at sample " in log.remarks[0]

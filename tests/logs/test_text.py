@@ -26,6 +26,7 @@ TWO_ROWS = "0,1,2\n1,3,4\n"
         "\n\nt,x_d,x\n\n0,1,2\n\n1,3,4\n\n",
         "note,x,t,x_d\n9,2,0,1\nno number,4,1,3\n",
         "t,x_d,x,\n0,1,2,\n1,3,4,\n",
+        "| t | x_d | x |\n|---|---|---|\n| 0 | 1 | 2 |\n| 1 | 3 | 4 |\n",
         # Preambles, comments and rows of units
         "Machine;A 12\nDate;2023-12-21\n\nt;x_d;x\n0;1;2\n1;3;4\n",
         "# machine A\n% two marks\n// three\nt,x_d,x\n0,1,2\n# paused, here\n1,3,4\n",
@@ -59,7 +60,7 @@ TWO_ROWS = "0,1,2\n1,3,4\n"
         "Name;Zeit;Soll;Ist\nEinheit;ms;mm;mm\n;0;1000;2000\n;1000;3000;4000\n",
     ],
 )
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "latin-1", "utf-16"])
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "latin-1", "utf-16", "utf-16-le", "utf-16-be"])
 def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
     log = read_log(write_csv(tmp_path / "log", text, encoding))
     np.testing.assert_allclose([log.t, log.x_d, log.x_meas], [[0, 1], [1, 3], [2, 4]], rtol=1e-15)
@@ -91,14 +92,15 @@ def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
         (f't,x_d,x\n0,0,"{"a" * 200_000}"\n', "line 2: column 'x' must be a number, got 'aaa"),
         (
             "t,pos_act,pos_err\n0,1,2\n",
-            r"name it: --x_d .*; or write it into the file: x = x_d − 'pos_err', plus where",
+            r"name it: --x_d .*; or the error beside .*: --error=pos_err \(where .* --error=-pos_err\), in Python col",
         ),
-        ("t,pos_err\n0,1\n", "an error alone tells no command"),
+        ("t,pos_err\n0,1\n", "an error alone tells neither position"),
         ("t,vel_cmd,vel_act\n0,1,2\n", r"columns 'x_d', 'x' are missing, .*; velocities are none: record positions$"),
         (
             "t,axis,x_d,x\n" + "".join(f"{k // 2},{'XY'[k % 2]},{k % 2},{k % 2}\n" for k in range(9)),
             "rows of 2 axes follow",
         ),
+        ("t,x_d,x\n" + "0,0,\n.5,,0\n" * 9, r"rows have either 'x_d' or 'x': channels with times of their own;"),
         ("t,x_d,x\n0;0;0\n", "line 2: column 't' must be a number, got '0;0;0'"),
     ],
 )
@@ -111,7 +113,7 @@ def test_a_log_of_labview(tmp_path: Path) -> None:
     head += "Y_Unit_Label\tmm\tmm\t\nX0\t0.0\t0.0\t\nDelta_X\t0.5\t0.5\t\n***End_of_Header***\t\t\t\n"
     rows = "".join(f"{k / 2:.3f}\t{k}.0\t{k}.5\n" for k in range(9))
     log = read_log(write_csv(tmp_path / "log.lvm", f"{head}X_Value\tCommand\tActual\tComment\n{rows}"))
-    assert (log.T_s, log.file_unit, log.columns, log.x_meas[1]) == (0.5, "mm", ("Command", "Actual"), 1.5e-3)
+    assert (log.T_s, log.file_unit, log.columns["x"], log.x_meas[1]) == (0.5, "mm", "Actual", 1.5e-3)
 
 
 def test_latin_1_far_down(tmp_path: Path) -> None:
