@@ -206,7 +206,7 @@ def is_table(given: Any) -> bool:
     marks = ("collect", "columns", "column_names", "data_vars")  # in order: polars warns of a LazyFrame's columns
     fields = getattr(getattr(given, "dtype", None), "names", None)
     return not isinstance(given, Log) and (
-        isinstance(given, Mapping) or bool(fields) or any(hasattr(given, mark) for mark in marks)
+        isinstance(given, Mapping) or isinstance(fields, tuple) or any(hasattr(given, mark) for mark in marks)
     )
 
 

@@ -122,6 +122,8 @@ def _rows(path: Path, name: str, t: Array, given: float | None, remarks: tuple[s
     changes = np.flatnonzero(usual > 0.0)
     mean = float(usual[changes[0] + 1 : changes[-1] + 1].mean() if len(changes) > 1 else usual.mean())
     about = _rounded(mean, resolution / max(float(usual.sum()), resolution))
+    if given is None and np.mean(steps < 0.0) > NOT_LATER:
+        raise LogError(f"{path}: time {brief(name)} goes back in {np.sum(steps < 0.0)} rows; sort the rows by it")
     if given is None:
         raise LogError(
             f"{path}: time {brief(name)} is rounded too coarsely, {100 * np.mean(steps <= 0.0):.3g} % of the times are "
