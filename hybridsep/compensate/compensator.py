@@ -100,8 +100,8 @@ class SepCompensator:
         # Coefficients of the remainder of the last plan; last values of δ and of x_d
         self._previous_plan = np.zeros(N_DECIDED + self._basis.n_free)
         self._last_stop = np.zeros(0 if self._stop is None else self._stop.n)
-        self._delta_before = np.zeros(3)
         self._x_d_before = np.full(max(3, predictor.settings.n_late), np.nan)
+        self._delta_before = np.zeros(len(self._x_d_before))
         self._pending: PendingPlan | None = None
 
     @property
@@ -179,13 +179,13 @@ class SepCompensator:
         path = np.concatenate((command, command[-1] + (command[-1] - command[-2]) * more))
         loads = np.concatenate((loads, np.full(len(more), loads[-1])))
         preview = Preview(
-            path, loads, self._x_d_before[-3:], self._delta_before, self._previous_plan, self._state_before
+            *(path, loads, self._x_d_before[-3:], self._delta_before[-3:], self._previous_plan, self._state_before)
         )
         fades = self.monitor.is_tripped or self.monitor.is_lost
         chosen = self._planning.choose(predictor, preview, SepState.OFF if fades else self.compensate)
         coefficients, stop = chosen.coefficients, self._last_stop
         if self._stop is not None:
-            limits = self._planning.bounds.hard(command, self._x_d_before[-3:], self._delta_before)
+            limits = self._planning.bounds.hard(command, preview.x_d_before, preview.delta_before)
             coefficients, stop = self._stop.carried_out(coefficients, stop, *limits)
         delta = (self._basis.values @ coefficients)[:Np]
         x_dm = command[:Np] + delta
@@ -215,17 +215,18 @@ class SepCompensator:
         predictor, Np = self.predictor, self.predictor.Np
         measured, monitor = as_measured(x, "x", Np, T_s=self.T_s).copy(), replace(self.monitor)
         x_d = np.concatenate((self._x_d_before, pending.x_d))
-        first = len(self._x_d_before) - predictor.settings.n_late  # what is measured is late
-        for i, error in enumerate((measured - x_d[first : first + Np]).tolist()[monitor.n_taken :], monitor.n_taken):
-            if not monitor.take_in(error) and predictor.settings.averaging:
+        delta = np.concatenate((self._delta_before, pending.delta))
+        late = len(self._x_d_before) - predictor.settings.n_late  # what is measured is late
+        for i in range(monitor.n_taken, Np):
+            is_sound = monitor.take_in(float(measured[i] - x_d[late + i]), float(delta[late + i]))
+            if not is_sound and predictor.settings.averaging:
                 measured[i] = np.nan
         predictor.update(measured, learn=predictor.k >= self.lead_in, ahead=self._planning.due)
         self.monitor, monitor.n_taken = monitor, 0
         kept = Np // self.spacing
         self._previous_plan = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
         self._last_stop = np.concatenate((pending.stop[kept:], np.repeat(pending.stop[-1:], kept)))
-        self._delta_before = np.concatenate((self._delta_before, pending.delta))[-3:]
-        self._x_d_before = x_d[-len(self._x_d_before) :]
+        self._x_d_before, self._delta_before = (one[-len(self._x_d_before) :] for one in (x_d, delta))
         self._state_before = pending.state
         self._planning.follow(pending)
         self._pending = None

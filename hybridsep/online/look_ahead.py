@@ -192,8 +192,8 @@ class LookAhead:
         self._first_scored = self._first_compared
         self._next = start  # where measurements come a sample early, that of the next sample
         self._residual = 0.0  # of the last sample measured, as published; 0 until one after the first fill is measured
-        # Commanded position, x_pb, x_h and hold, as predicted for the samples whose measurement is still to come
-        self._compared = np.full((4, self.predictor.settings.n_late + self.Np), start)
+        # Commanded position, x_pb, x_h, hold and modified command, for the samples whose measurement is still to come
+        self._compared = np.full((5, self.predictor.settings.n_late + self.Np), start)
         # The last commands, r(k − delay) … r(k − 1), which is x_d(k) … x_d(k + delay − 1)
         self._ahead, self._measured = np.full(self.delay, start), np.full(self.Np, start)
         # Their loads, from that of the first sample on
@@ -264,7 +264,8 @@ class LookAhead:
         self.check(x_d_ahead, x_meas, x_load)
         if self.predictor.settings.measurement_delay < 0:
             x_meas, self._next = self._next, x_meas
-        is_sound = self.planner.monitor.take_in(float(x_meas - self._compared[0, self.k % self.Np]))
+        x_d, *_, x_dm = self._compared[:, self.k % self.Np].tolist()
+        is_sound = self.planner.monitor.take_in(x_meas - x_d, x_dm - x_d)
         if self.k == 0:
             self._first_load = x_load
         self._ahead[self.k % self.delay] = x_d_ahead
@@ -274,7 +275,7 @@ class LookAhead:
             self._residual = float(x_meas - self._compared[1, self.k % self.Np])
         if self.k >= self._first_scored and not math.isnan(x_meas):
             self._n_scored += 1
-            self._sums += np.square(x_meas - self._compared[:, self.k % self.Np])
+            self._sums += np.square(x_meas - self._compared[:-1, self.k % self.Np])
         self.k += 1
         if self.k % self.Np == 0:
             self.planner.update(self._measured)
@@ -323,6 +324,6 @@ class LookAhead:
 
     def _compare(self) -> None:
         """Append the window to what measurements are compared with."""
-        window, Np = self.window, self.Np
-        hold = window.x_pb + self._residual
-        self._compared = np.hstack((self._compared[:, Np:], np.stack((window.x_d, window.x_pb, window.x_h, hold))))
+        window, hold = self.window, self.window.x_pb + self._residual
+        new = np.stack((window.x_d, window.x_pb, window.x_h, hold, window.x_dm))
+        self._compared = np.hstack((self._compared[:, self.Np :], new))

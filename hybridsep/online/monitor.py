@@ -1,4 +1,9 @@
-"""Monitor of the following error, as drives have one, and of measurements that are missing."""
+"""Monitor of the following error, as drives have one, and of measurements that are missing.
+
+It watches two errors: behind the command as it came, and behind the one that was sent, which is what the drive's own
+monitor sees. Where a change of the command helps, the first one falls and the second one stays as it was without the
+change, so their product falls, too. Where it does not, for want of force, or as the sensor is wrong, both grow.
+"""
 
 import math
 from dataclasses import dataclass, field
@@ -8,7 +13,7 @@ from ..base.state import FIXED
 
 @dataclass
 class Monitor:
-    """Samples in a row that are missing, or whose following error is above the limit."""
+    """Samples in a row that are missing, or whose following error is above the limit, or the mean of both is."""
 
     n_lost: int = field(default=0, metadata=FIXED)  # samples without a measurement after which it is lost; 0: never
     error_max: float = field(default=0.0, metadata=FIXED)  # largest following error, m; 0: none
@@ -26,10 +31,11 @@ class Monitor:
         """Whether the change of the command fades until a reset."""
         return self.n_over >= 3  # in a row, missing ones aside: one or two may be the sensor's outliers
 
-    def take_in(self, error: float) -> bool:
+    def take_in(self, error: float, change: float) -> bool:
         """Take in a sample's following error, measured position minus command as it came, m; NaN where missing.
 
-        Returns whether it is within the limit, and nothing has tripped: what is not is not learned.
+        ``change``, m: of the command that was sent. Returns whether the error, and its geometric mean with the one
+        behind that command, are within the limit, and nothing has tripped: what is not is not learned.
         """
         self.n_taken += 1
         if math.isnan(error):
@@ -37,7 +43,8 @@ class Monitor:
             return True
         self.n_missing = 0
         if not self.is_tripped:
-            self.n_over = self.n_over + 1 if abs(error) > self.error_max > 0.0 else 0
+            square = max(error * error, error * (error - change))
+            self.n_over = self.n_over + 1 if square > self.error_max**2 > 0.0 else 0
         return self.n_over == 0
 
     def reset(self) -> None:

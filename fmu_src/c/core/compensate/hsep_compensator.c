@@ -5,7 +5,8 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_p
     const hsep_real preview = (hsep_real)parameters->preview, horizon = (hsep_real)parameters->horizon;
     hsep_real end = HSEP_WORDS(hsep_compensator);
     self->n_lost = parameters->n_lost;
-    self->x_dm = hsep_take(&end, (hsep_real)parameters->settings.Np);
+    const hsep_int late = hsep_late(&parameters->settings);
+    self->x_dm = hsep_take(&end, (hsep_real)(late + parameters->settings.Np)) + late;
     self->loads = hsep_take(&end, preview);
     self->load = hsep_take(&end, horizon);
     self->trial_x = hsep_take(&end, horizon + (hsep_real)parameters->settings.q);
@@ -40,6 +41,9 @@ HSEP_API void hsep_compensator_block_init(
     self->change_max_next = parameters->compensator.change_max;
     self->error_max = parameters->compensator.following_error_max;
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
+    for (hsep_int i = 1; i <= hsep_late(&parameters->settings); i++) {
+        hsep_at(self, self->x_dm)[-i] = start;
+    }
     /* The spline filtered by the physics model from rest, which is constant. */
     hsep_physics *trial = compensator_trial(self);
     hsep_real *spline = hsep_at(self, self->spline_pb);
@@ -295,9 +299,11 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
 }
 
-/* Count what is missing, and what follows the command as it came, m, too badly; NaN: missing. Return whether it is
- * within the limit, and nothing has tripped: what is not is not learned. */
-static int compensator_monitor(hsep_compensator *self, hsep_real error)
+/* Count what is missing, and what follows the command as it came, m, too badly; NaN: missing; or, in the geometric
+ * mean, this command and the one that was sent. Where its change, m, helps, the one error falls and the other one stays
+ * as it was without the change; where it does not, for want of force, or as the sensor is wrong, both grow. Return
+ * whether it is within the limit, and nothing has tripped: what is not is not learned. */
+static int compensator_monitor(hsep_compensator *self, hsep_real error, hsep_real change)
 {
     if (isnan(error)) {
         self->missing += self->missing < self->n_lost;
@@ -305,7 +311,9 @@ static int compensator_monitor(hsep_compensator *self, hsep_real error)
     }
     self->missing = 0;
     if (self->over < HSEP_OVER) {
-        self->over = self->error_max > 0.0 && hsep_fabs(error) > self->error_max ? self->over + 1 : 0;
+        const hsep_real most = self->error_max * self->error_max;
+        const hsep_real square = hsep_fmax(error * error, error * (error - change));
+        self->over = most > 0.0 && square > most ? self->over + 1 : 0;
     }
     return self->over == 0;
 }
@@ -331,11 +339,14 @@ HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     self->first_load = predictor->k == 0 ? self->x_load : self->first_load;
     hsep_at(self, self->loads)[predictor->k % predictor->preview] = self->x_load - self->first_load;
-    const hsep_real *x_d = hsep_at(predictor, predictor->x_d - predictor->late);
-    const hsep_real error = (predictor->early ? predictor->next : x_meas) - x_d[predictor->k % predictor->Np];
-    const int is_sound = compensator_monitor(self, error) || !self->averaged;
+    const hsep_int i = predictor->k % predictor->Np - predictor->late;
+    const hsep_real *x_d = hsep_at(predictor, predictor->x_d);
+    hsep_real *x_dm = hsep_at(self, self->x_dm);
+    const hsep_real error = (predictor->early ? predictor->next : x_meas) - x_d[i];
+    const int is_sound = compensator_monitor(self, error, x_dm[i] - x_d[i]) || !self->averaged;
     if (hsep_predictor_take_in(predictor, x_d_ahead, x_meas, is_sound)) {
         hsep_predictor_finish(predictor);
+        hsep_copy(x_dm - predictor->late, x_dm + predictor->Np - predictor->late, predictor->late);
         hsep_planner_next(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
         compensator_begin_loads(self);
         hsep_compensator_begin(self);

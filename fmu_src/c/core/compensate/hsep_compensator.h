@@ -35,7 +35,7 @@ struct hsep_compensator {
     hsep_int was_reset;        /* last level of the reset */
     hsep_real x_load;          /* m, load that a sample brings, */
     hsep_real first_load;      /* and that of the first sample, from which it counts, as positions do from the start */
-    hsep_int x_dm;             /* (Np,) m, the window: modified commands */
+    hsep_int x_dm;             /* (Np,) m, the window: modified commands; before it the last ones not measured yet */
     hsep_int loads;            /* (preview,) m, ring of the loads that came last, */
     hsep_int load;      /* (horizon,) m, of the window and of what follows it, too: the drive moves as by that much
                            more command */
