@@ -61,7 +61,7 @@ class SepCompensator:
         without averaging.
     """
 
-    _SAVED = ("lead_in", "_state_before", "monitor", "_previous_plan", "_last_stop", "_delta_before", "_x_d_before")
+    _SAVED = ("lead_in", "_state_before", "monitor", "_previous_plan", "_last_stop", "_before")
     _SAVED_OF_PLANNING = ("ahead", "share", "corrected", "reach")
 
     def __init__(self, predictor: HybridPredictor, settings: CompensatorSettings | None = None) -> None:
@@ -97,11 +97,10 @@ class SepCompensator:
         self._planning.restart()
         n_lost = samples_before(self.settings.measurement_timeout, self.T_s)
         self.monitor = Monitor(n_lost, self.settings.following_error_max)
-        # Coefficients of the remainder of the last plan; last values of δ and of x_d
+        # Coefficients of the remainder of the last plan; (2, n), m: last values of x_d and of δ
         self._previous_plan = np.zeros(N_DECIDED + self._basis.n_free)
         self._last_stop = np.zeros(0 if self._stop is None else self._stop.n)
-        self._x_d_before = np.full(max(3, predictor.settings.n_late), np.nan)
-        self._delta_before = np.zeros(len(self._x_d_before))
+        self._before = np.repeat([[np.nan], [0.0]], max(3, predictor.settings.n_late), axis=1)
         self._pending: PendingPlan | None = None
 
     @property
@@ -149,11 +148,8 @@ class SepCompensator:
         ``x_load``, m: load for ``preview`` samples later, as :meth:`plan` takes it, counted from the first sample's.
         SignalError as :meth:`LookAhead.sample <hybridsep.online.look_ahead.LookAhead.sample>`.
         """
-        online = self._online
-        if online is None:
-            start = self.predictor.start
-            online = LookAhead(self, x_d_ahead if start is None else start)
-            self._online = online  # making it restarts the compensator
+        online = self._online or LookAhead(self, x_d_ahead if self.predictor.start is None else self.predictor.start)
+        self._online = online  # making it restarts the compensator
         online.sample(x_d_ahead, x_meas, x_load)
         return online.x_dm
 
@@ -173,19 +169,18 @@ class SepCompensator:
         predictor, Np = self.predictor, self.predictor.Np
         if predictor.start is None:  # at rest where the first command is
             predictor.state = replace(predictor.state, start=float(command[0]))
-        if np.isnan(self._x_d_before[0]):
-            self._x_d_before[:] = predictor.start
+        if np.isnan(self._before[0, 0]):
+            self._before[0] = predictor.start
         more = np.arange(1, self.horizon - self.preview + 1)
         path = np.concatenate((command, command[-1] + (command[-1] - command[-2]) * more))
         loads = np.concatenate((loads, np.full(len(more), loads[-1])))
-        preview = Preview(
-            *(path, loads, self._x_d_before[-3:], self._delta_before[-3:], self._previous_plan, self._state_before)
-        )
+        x_d_before, delta_before = self._before[:, -3:]
+        preview = Preview(path, loads, x_d_before, delta_before, self._previous_plan, self._state_before)
         fades = self.monitor.is_tripped or self.monitor.is_lost
         chosen = self._planning.choose(predictor, preview, SepState.OFF if fades else self.compensate)
         coefficients, stop = chosen.coefficients, self._last_stop
         if self._stop is not None:
-            limits = self._planning.bounds.hard(command, preview.x_d_before, preview.delta_before)
+            limits = self._planning.bounds.hard(command, x_d_before, delta_before)
             coefficients, stop = self._stop.carried_out(coefficients, stop, *limits)
         delta = (self._basis.values @ coefficients)[:Np]
         x_dm = command[:Np] + delta
@@ -197,10 +192,8 @@ class SepCompensator:
             share, correction = chosen.share, chosen.coefficients - self._previous_plan
         self._pending = PendingPlan(coefficients, delta, now, stop, chosen.state, share, correction, reach)
         as_published(prediction.x_pb, "x_pb")
-        x_h, x_h_std, n_warm_up, n_followed = self._planning.published(prediction, chosen.state)
-        return PublishedWindow(
-            now, x_dm, prediction.x_pb, x_h, x_h_std, chosen.state, n_warm_up, n_followed, self._state_before
-        )
+        found = self._planning.published(prediction, chosen.state)
+        return PublishedWindow(now, x_dm, prediction.x_pb, *found[:2], chosen.state, *found[2:], self._state_before)
 
     @one_blas_thread
     def update(self, x: ArrayLike) -> None:
@@ -214,19 +207,17 @@ class SepCompensator:
             raise SignalError("update must follow plan: there is no planned window to measure")
         predictor, Np = self.predictor, self.predictor.Np
         measured, monitor = as_measured(x, "x", Np, T_s=self.T_s).copy(), replace(self.monitor)
-        x_d = np.concatenate((self._x_d_before, pending.x_d))
-        delta = np.concatenate((self._delta_before, pending.delta))
-        late = len(self._x_d_before) - predictor.settings.n_late  # what is measured is late
-        for i in range(monitor.n_taken, Np):
-            is_sound = monitor.take_in(float(measured[i] - x_d[late + i]), float(delta[late + i]))
-            if not is_sound and predictor.settings.averaging:
+        before = np.hstack((self._before, (pending.x_d, pending.delta)))
+        x_d, delta = before[:, -predictor.settings.n_late - Np :][:, :Np]  # what is measured is late
+        for i, (error, change) in enumerate(zip((measured - x_d).tolist(), delta.tolist(), strict=True)):
+            if i >= monitor.n_taken and not monitor.take_in(error, change) and predictor.settings.averaging:
                 measured[i] = np.nan
         predictor.update(measured, learn=predictor.k >= self.lead_in, ahead=self._planning.due)
         self.monitor, monitor.n_taken = monitor, 0
         kept = Np // self.spacing
         self._previous_plan = np.concatenate((pending.coefficients[kept:], np.zeros(kept)))
         self._last_stop = np.concatenate((pending.stop[kept:], np.repeat(pending.stop[-1:], kept)))
-        self._x_d_before, self._delta_before = (one[-len(self._x_d_before) :] for one in (x_d, delta))
+        self._before = before[:, Np:]
         self._state_before = pending.state
         self._planning.follow(pending)
         self._pending = None

@@ -37,7 +37,7 @@ _NO_MEASUREMENT = (
     "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
 )
 _STD = "standard deviation of x_meas - x_h, now; 0: not known"
-_ALARM = "whether the compensator has tripped: x_meas - x_d was above following_error_max for three samples in a row"
+_ALARM = "whether it has tripped: for three samples x_meas - x_d, or its mean with x_meas - x_dm, was over its limit"
 # no input: several masters set all inputs by setReal
 _RESET = "a rising edge ends a trip; what was learned before it stays"
 _LOAD = (

@@ -325,5 +325,5 @@ class LookAhead:
     def _compare(self) -> None:
         """Append the window to what measurements are compared with."""
         window, hold = self.window, self.window.x_pb + self._residual
-        new = np.stack((window.x_d, window.x_pb, window.x_h, hold, window.x_dm))
+        new = window.x_d, window.x_pb, window.x_h, hold, window.x_dm
         self._compared = np.hstack((self._compared[:, self.Np :], new))

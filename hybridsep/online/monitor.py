@@ -1,8 +1,7 @@
 """Monitor of the following error, as drives have one, and of measurements that are missing.
 
-It watches two errors: behind the command as it came, and behind the one that was sent, which is what the drive's own
-monitor sees. Where a change of the command helps, the first one falls and the second one stays as it was without the
-change, so their product falls, too. Where it does not, for want of force, or as the sensor is wrong, both grow.
+Where a change of the command helps, the error behind the command as it came falls, and the one behind the command that
+was sent stays as it was without the change. Where it does not, for want of force or with a wrong sensor, both grow.
 """
 
 import math
@@ -32,10 +31,10 @@ class Monitor:
         return self.n_over >= 3  # in a row, missing ones aside: one or two may be the sensor's outliers
 
     def take_in(self, error: float, change: float) -> bool:
-        """Take in a sample's following error, measured position minus command as it came, m; NaN where missing.
+        """Take in a sample's following error, measured position minus command as it came, m, and the command's change.
 
-        ``change``, m: of the command that was sent. Returns whether the error, and its geometric mean with the one
-        behind that command, are within the limit, and nothing has tripped: what is not is not learned.
+        NaN where missing. Returns whether the error, and its geometric mean with the one behind the command that was
+        sent, are within the limit, and nothing has tripped: what is not is not learned.
         """
         self.n_taken += 1
         if math.isnan(error):

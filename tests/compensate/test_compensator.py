@@ -92,8 +92,7 @@ def test_windows_are_monitored_as_samples_are() -> None:
     """Sample by sample, on every implementation: tests/suite/test_tunable.py."""
     predictor = HybridPredictor(MODEL, PredictorSettings(Np=50, p=10, measurement_delay=2))
     sep = SepCompensator(predictor, CompensatorSettings(preview=200, limits=DRIVE_LIMITS, following_error_max=1e-6))
-    x_d = move(400)
-    late = np.concatenate((np.zeros(2), x_d))
+    x_d, late = move(400), np.concatenate((np.zeros(2), move(400)))
     for k in (0, 50, 100):
         assert sep.plan(x_d[k : k + 200]).state != SepState.OFF
         assert not sep.monitor.is_tripped

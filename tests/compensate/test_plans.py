@@ -204,7 +204,7 @@ def test_compensation_ends_by_the_least_change_that_its_jerk_allows(
     found = sep._pending.coefficients
     n, new = 3 + n_pinned, 10  # splines that are decided or pinned, and the ones after the last plan
     third = np.diff(np.concatenate((np.zeros((3, basis.values.shape[1])), basis.values)), 3, axis=0)
-    before = np.diff(np.concatenate((sep._delta_before, np.zeros(200))), 3)
+    before = np.diff(np.concatenate((sep._before[1], np.zeros(200))), 3)
     weight = (2.0 * np.sin(np.pi * 5.0 / 200)) ** -3.0
     A, b = np.concatenate((basis.values, weight * third)), np.concatenate((np.zeros(200), -weight * before))
     least = np.linalg.lstsq(A[:, n:-new], b - A[:, :n] @ last[:n], rcond=None)[0]
