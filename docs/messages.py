@@ -46,7 +46,7 @@ ERRORS: Mapping[str, Explanation] = {
     "MachineError": Explanation(
         "A machine file cannot be read, has an unknown entry or one out of its range, or is inconsistent.",
         "Compare with the reference of [machine files](machine-file.md), or let `hybridsep init` write one.",
-        ("give either [[physics.mode]] entries or one [physics.spring_mass_damper] or [physics.cascade]",),
+        ("give [[physics.mode]] entries, [physics.spring_mass_damper] or [physics.cascade]",),
     ),
     "ModelError": Explanation(
         "A linear model is unstable, improper, or cannot be written as a sum of modes, eq. (15).",

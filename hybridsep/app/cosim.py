@@ -190,9 +190,7 @@ def _say_optimistic(*machines: Machine) -> None:
     from .console import console
 
     if any(isinstance(axis.plant, IdentifiedSection) for axis in machines):
-        console.print(
-            "The plant is identified from a log, to try with and no measurement: results on it are optimistic."
-        )
+        console.print("The plant is identified from a log, to try with, no measurement: results on it are optimistic.")
 
 
 def _path_limits(axis: Machine) -> tuple[float, ...]:

@@ -19,17 +19,13 @@ _CONTROLLERS = ("twincat",)  # controllers that ``--for`` takes
 
 
 def build(
-    fmus: Annotated[
-        list[str] | None, typer.Argument(help="FMUs to build, by name; all of the machine's if left out.")
-    ] = None,
+    fmus: Annotated[list[str] | None, typer.Argument(help="FMUs to build; all of the machine's if left out.")] = None,
     machine: options.MachineOption = DEFAULT_MACHINE,
     entries: options.SetOption = None,
     flavour: Annotated[str, typer.Option(help=f"Flavour of the FMUs: {', '.join(FLAVOURS)}.")] = FLAVOURS[0],
     fmi: Annotated[
         str,
-        typer.Option(
-            help=f"Version of FMI: {', '.join(FMI_VERSIONS)}; FMUs of FMI 3.0 are native, their names have Fmi3."
-        ),
+        typer.Option(help=f"Version of FMI: {', '.join(FMI_VERSIONS)}; those of 3.0 are native, named with Fmi3."),
     ] = FMI_VERSIONS[0],
     target: options.TargetOption = None,
     weights: options.WeightsOption = None,
@@ -195,9 +191,7 @@ def hal(
     for path in stale:
         path.unlink()
         typer.echo(f"{path} removed: without --weights the axis starts cold")
-    typer.echo(
-        f"{out / component}.c written, with its sources; install it: sudo halcompile --install {out / component}.c"
-    )
+    typer.echo(f"{out / component}.c written, with sources; install it: sudo halcompile --install {out / component}.c")
     typer.echo(f"loadrt {component} axes={','.join(str((out / name).resolve()) for name in names)}")
 
 

@@ -36,9 +36,7 @@ def backtest(
     *,
     reading: options.ReadingOptions,
     report: Annotated[Path | None, typer.Option(help="HTML file about the replay, which needs no network.")] = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="PNG, PDF or SVG with the errors of the predictions over time.")
-    ] = None,
+    figure: Annotated[Path | None, typer.Option(help="PNG, PDF or SVG with the prediction errors over time.")] = None,
     save: Annotated[
         list[Path] | None,
         typer.Option(

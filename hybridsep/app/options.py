@@ -84,11 +84,7 @@ class ReadingOptions:
     x_d: Annotated[str | None, typer.Option("--x_d", help="Name of the commanded position's column.")] = None
     x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None
     error: Annotated[
-        str | None,
-        typer.Option(
-            "--error",
-            help="Name of the error's column, commanded − measured (--error=-NAME: the other way) beside one position.",
-        ),
+        str | None, typer.Option("--error", help="Column of commanded − measured, beside one; -NAME: the other way.")
     ] = None
     delay: Annotated[
         int, typer.Option(help="Samples by which the log has the measured position too late (negative: too early).")
@@ -109,9 +105,8 @@ class ReadingOptions:
             return {**given, "columns": columns, "unit": self.unit, "axis": self.axis}
         own = machine.log
         # with a sampling interval there may be no times, and an error is in the place of a position
-        others = {"t"} if self.T_s is not None else set()
-        others |= {"x_d" if self.x else "x"} if self.error else set()
-        names = {role: column for role, column in own.columns.items() if role not in others}
+        left = ("t" if self.T_s is not None else "", ("x_d" if self.x else "x") if self.error else "")
+        names = {role: column for role, column in own.columns.items() if role not in left}
         own_values = {"unit": self.unit or own.unit, "axis": self.axis or own.axis}
         return {**given, **own_values, "columns": {**names, **columns}}
 

@@ -52,9 +52,7 @@ def unpack(kind: str, blob: bytes | bytearray) -> tuple[dict[str, Any], dict[str
         raise StateError(f"a saved state of kind {kind!r} was expected, got {len(blob)} bytes of another format")
     _, version, length = _PREFIX.unpack_from(blob)
     if version != VERSION:
-        raise StateError(
-            f"the saved state has format version {version}, this library reads version {VERSION}: train again"
-        )
+        raise StateError(f"the saved state has format version {version}, this library reads {VERSION}: train again")
     if zlib.crc32(blob[: -_CRC.size]) != _CRC.unpack(blob[-_CRC.size :])[0]:
         raise StateError(f"the saved state is truncated or damaged: its {len(blob)} bytes do not fit its checksum")
     header, offset = json.loads(blob[_PREFIX.size : _PREFIX.size + length]), _PREFIX.size + length

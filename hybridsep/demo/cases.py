@@ -234,9 +234,7 @@ _PICTURES = {
 def write_page(out: Path, summary: Summary, files: Sequence[Path]) -> None:
     """Write ``index.html`` about a demonstration, with links to all ``files``, the page among them."""
     names = sorted(path.relative_to(out).as_posix() for path in files if path.name != "index.html")
-    about = (
-        "FMUs of a predictor, a compensator and a drive, co-simulated over the paper's trajectories, simulated drives"
-    )
+    about = "FMUs of predictor, compensator and drive, co-simulated over the paper's trajectories, simulated drives"
     page = Report("hybridsep demo", about)
     for table in (compensation_table(summary), prediction_table(summary)):
         page.heading(table.title)

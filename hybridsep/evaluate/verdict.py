@@ -100,9 +100,7 @@ def judge(
     whole = (np.bincount(window) == Np) & (np.bincount(window, known) > 0)
     lost = len(x) - n_known
     ratios = tuple(math.nan if peer < least**2 * n_known else _ratio(h, peer) for peer in peers)
-    worse = (
-        tuple(name for name, one in sums.items() if _ratio(one[-1], one[i]) > 1.0 + ALIKE) for i in range(len(peers))
-    )
+    worse = (tuple(key for key, at in sums.items() if _ratio(at[-1], at[i]) > 1.0 + ALIKE) for i in range(len(peers)))
     later = squares[:, window >= _N_EARLY].sum(axis=1) if len(begin) > 2 * _N_EARLY else None
     change = float(np.abs(predictions[-1] - predictions[0]).max(initial=0.0))
     largest = math.sqrt(squares[0].max(initial=0.0))
@@ -126,9 +124,8 @@ def _cause(ratios: Sequence[float], change: float, largest: float, later: Array 
     after the beginning of a long run.
     """
     if change > _UNSTABLE * largest > 0.0:
-        return (
-            f"the prediction is unstable: it leaves the physics model by {change / largest:.2g} × the largest residual"
-        )
+        far = f"{change / largest:.2g} × the largest residual"
+        return f"the prediction is unstable: it leaves the physics model by {far}"
     peers = [peer for peer, value in enumerate(ratios) if value > 1.0 + ALIKE]
     if peers and later is not None and all(_ratio(later[-1], later[peer]) <= 1.0 + ALIKE for peer in peers):
         return f"only the first {_N_EARLY} windows are worse, where hardly anything has been learned yet"

@@ -21,9 +21,7 @@ _IN_WORDS = {"physics model": "the physics model alone", "hold": "holding the la
 
 OF_ITSELF = "What the controller says of itself"  # heading of :meth:`Judged.of_the_controller`
 
-_KNOWN = (
-    "Nothing is tested: the saved predictor was trained with this log, and knows it; replay another log of the axis."
-)
+_KNOWN = "Nothing is tested: the saved predictor was trained with this log, and knows it; replay another log."
 
 
 @dataclass(frozen=True)
@@ -95,9 +93,8 @@ def advice_on(judged: Judged) -> str:
         return _KNOWN
     n = judged.replay.verdict().n_windows
     if n < WINDOWS_MIN:
-        return (
-            f"Nothing could be judged: {judged.part} has {counted(n)} of {judged.replay.Np} samples; {_enough(judged)}."
-        )
+        of = f"{judged.part} has {counted(n)} of {judged.replay.Np} samples"
+        return f"Nothing could be judged: {of}; {_enough(judged)}."
     if np.ptp(judged.replay.commands()) == 0.0:
         return f"Nothing was tested: the commanded position does not move in {judged.part}; record moves to its end."
     *others, hybrid = judged.replay.scored()
@@ -184,9 +181,7 @@ def peers_in_words(judged: Judged) -> str:
         f"increments by least squares, {ways}refitted before each window to all samples so far"
     )
     if judged.replay.offset:
-        words.append(
-            "the physics model is judged with the offset that was identified beside it; the FMU's x_pb has none"
-        )
+        words.append("the physics model is judged with the offset identified beside it; the FMU's x_pb has none")
     return "; ".join(words) + "."
 
 

@@ -67,10 +67,8 @@ def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
     """
     found = {entry: one.checked(given[one.name]) for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
     names = [parameter.name for parameter in Limits.parameters().values()]
-    if found and (missing := [name for name in names if name not in given]):
-        raise ParameterError(
-            f"a compensator needs the drive's limits {', '.join(names)}; missing: {', '.join(missing)}"
-        )
+    if found and (left := [name for name in names if name not in given]):
+        raise ParameterError(f"a compensator needs the drive's limits {', '.join(names)}; missing: {', '.join(left)}")
     return found
 
 
@@ -153,9 +151,7 @@ class LimitCosts:
             entries = {one.name: entry for entry, one in DRIVE_LIMIT_ENTRIES.items()}
             paste = (f"{option.format(name=one, entry=entries[one])}{v:.4g}" for one, v in self.advised.items())
             left, today = _words(self.advised_error, shown), _words(next(iter(self.effects.values()))[1.0], shown)
-            lines.append(
-                f"If the drive allows it: {' '.join(paste)}, with which about {left} is left of {today} there."
-            )
+            lines.append(f"If the drive allows it: {' '.join(paste)}, with which about {left} is left of {today}.")
         return lines
 
 

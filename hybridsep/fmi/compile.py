@@ -108,9 +108,7 @@ def compiler_for(target: str) -> Compiler:
         zig = (sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].triple, "-fno-sanitize=undefined")
         return zig, f"ziglang {version('ziglang')}"
     if target != host_target():
-        raise FmuError(
-            f"compiling for {target} needs ziglang: pip install {ZIG.replace(' ', '==')}, or ask for the target host"
-        )
+        raise FmuError(f"compiling for {target} needs ziglang: pip install {ZIG.replace(' ', '==')}, or --target host")
     chosen = os.environ.get("CC", "").split()
     for command in (chosen, ["cc"], ["gcc"], ["clang"]):
         if command and shutil.which(command[0]):
@@ -188,7 +186,9 @@ def library_paths(
         finally:  # after a failure or Ctrl-C no other one begins
             pool.shutdown(cancel_futures=True)
     if running:
-        _forget_old_versions()
+        versions = sorted(_cache().iterdir(), key=lambda folder: folder.stat().st_mtime, reverse=True)
+        for old in versions[4:]:  # a few branches of a checkout keep theirs, at 8 MB each
+            shutil.rmtree(old, ignore_errors=True)
     return places
 
 
@@ -265,9 +265,3 @@ def _cache() -> Path:
         return root / "build" / "binaries"
     user = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(user) / "hybridsep" / "binaries"
-
-
-def _forget_old_versions() -> None:
-    versions = sorted(_cache().iterdir(), key=lambda folder: folder.stat().st_mtime, reverse=True)
-    for folder in versions[4:]:  # a few branches of a checkout keep theirs, at 8 MB each
-        shutil.rmtree(folder, ignore_errors=True)

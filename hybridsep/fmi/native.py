@@ -65,9 +65,7 @@ def files(
 def _licenses() -> dict[str, bytes]:
     """Return our licence, the FMI headers' licences, which are in their own comments, and the compiler's."""
     folder = data_folder("fmu_src")
-    zig, mingw = (
-        (folder / "c" / "licenses" / f"{one}.txt").read_text(encoding="utf-8") for one in ("zig", "mingw-w64")
-    )
+    zig, mingw = ((folder / "c" / "licenses" / f"{one}.txt").read_text("utf-8") for one in ("zig", "mingw-w64"))
     lines = []
     for version in FMI_VERSIONS:
         first, second, third = FMI_HEADERS[version]

@@ -156,13 +156,11 @@ class _Solved(NamedTuple):
 class Problem:
     """Separable least-squares problem of a structure with one dead time."""
 
-    def __init__(
-        self, segments: Sequence[Segment], T_s: float, structure: Structure, delay: Delay, rows_max: int
-    ) -> None:
+    def __init__(self, segments: Sequence[Segment], T_s: float, structure: Structure, delay: Delay, n_max: int) -> None:
         self._structure = structure
-        self._section = cache(partial(polynomials, T_s=T_s, input_hold=delay.input_hold, zero=structure.zero))
+        self._section = cache(partial(polynomials, T_s=T_s, hold=delay.input_hold, zero=structure.zero))
         used = [segment for segment in segments if segment.known[: segment.stop].sum() > 1]
-        step = max(1, sum(s.stop for s in used) // rows_max)
+        step = max(1, sum(s.stop for s in used) // n_max)
         self._data = [
             (np.pad(delayed(s.u[: s.stop], delay.samples), (_LEAD, 0)), s.y[rows], rows)
             for s in used

@@ -123,9 +123,7 @@ STRUCTURES = tuple(replace(form, unit_gain=unit_gain) for form in _FORMS for uni
 """Structures by number of parameters, the simplest first."""
 
 
-def polynomials(
-    theta: Sequence[float] | Array, T_s: float, input_hold: str, *, zero: bool = True
-) -> tuple[Array, Array]:
+def polynomials(theta: Sequence[float] | Array, T_s: float, hold: str, *, zero: bool = True) -> tuple[Array, Array]:
     """Return numerators ``(1 or 2, m + 1)`` and denominator, in z⁻¹, of a mode, m = 2, or of the lag, m = 1.
 
     ``theta``, ``(m,)``, are its nonlinear parameters. The first numerator is the response's with a static gain of 1,
@@ -137,7 +135,7 @@ def polynomials(
     else:
         b = np.exp(np.asarray(theta))
         A = -b[None]
-    A, b, d = discretised_block(A, b, T_s, input_hold)
+    A, b, d = discretised_block(A, b, T_s, hold)
     trace = A.trace()
     columns, denominator = [np.zeros(len(b)), b], [1.0, -trace]
     if len(theta) == 2:

@@ -224,9 +224,7 @@ class ParquetSource(ArraysSource):
         try:
             self._arrow, self._parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
         except ModuleNotFoundError as error:
-            raise LogError(
-                f"{path}: is a Parquet file, which needs the extra parquet: pip install 'hybridsep[parquet]'"
-            ) from error
+            raise LogError(f"{path}: is a Parquet file, which needs: pip install 'hybridsep[parquet]'") from error
         with _reading(path, "a Parquet file"), self._parquet.ParquetFile(path) as file:
             schema = self._flat(file.schema_arrow.empty_table()).schema
         types = self._arrow.types

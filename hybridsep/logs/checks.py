@@ -46,7 +46,7 @@ _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 """Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit."""
 
 _START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
-_COUNTS, _WRAP = 2**16, 0.8  # of a counter that wraps once: its range; and share of its travel that a jump is of
+_WRAP = 0.8  # share of the travel that the jump of a counter has
 
 _USUAL = 0.98  # quantile of what is usual, beyond which are the samples that are looked for
 
@@ -149,15 +149,14 @@ def _wraps(log: Log) -> Iterator[Finding]:
     """Find measured positions that jump by all that they reach, against the command's motion, and go on as before."""
     steps = np.diff([log.x_d, log.x_meas], prepend=0.0)
     steps[:, log.starts] = 0.0
-    travel = _travel(log.x_meas)
-    anew, far = (np.abs(one) > _WRAP * _travel(x) for one, x in zip(steps, (log.x_d, log.x_meas), strict=True))
+    travels = _travel(log.x_d), _travel(log.x_meas)
+    anew, far = (np.abs(one) > _WRAP * travel for one, travel in zip(steps, travels, strict=True))
     moves = np.convolve(np.where(anew, 0.0, steps[0]), np.ones(5) / 5, "same")
     at = np.flatnonzero(far & (moves != 0.0))  # at rest noise jumps to and fro
-    if not len(at) or np.nanmax(np.abs(steps[1, ~far])) > (1.0 - _WRAP) * travel:
+    if not len(at) or np.nanmax(np.abs(steps[1, ~far])) > (1.0 - _WRAP) * travels[1]:
         return
-    period = float(np.median(np.abs(steps[1, at] - moves[at])))
-    once = abs(period / resolution(log.x_meas) / _COUNTS - 1.0) < 1.0 - _WRAP
-    if (len(at) > 1 or once) and np.mean(steps[1, at] * moves[at] < 0.0) > _WRAP:
+    if np.mean(steps[1, at] * moves[at] < 0.0) > _WRAP:
+        period = float(np.median(np.abs(steps[1, at] - moves[at])))
         words = (
             f"the measured position jumps by all that it reaches, in {len(at)} samples, and goes on: a counter or an "
             f"axis that begins anew; unwrap it before, with its period, about {log.shown.words(period)}"
@@ -240,8 +239,7 @@ def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Find
     noise = noise_std(x_d) / _travel(x_d), noise_std(filled) / _travel(x)
     better = _BETTER if noise[0] > _NOISIER * noise[1] else _BETTER_SWAPPED
     if "error" in log.columns:
-        x_of = "x_d" in log.columns
-        flipped = following(x_d, 2.0 * x_d - x) if x_of else following(2.0 * filled - x_d, x)
+        flipped = following(*((x_d, 2.0 * x_d - x) if "x_d" in log.columns else (2.0 * filled - x_d, x)))
         if _BETTER_SWAPPED * flipped.left < given.left and flipped.lag >= 1.0:  # much feed-forward leads a little
             words = "the position that the error tells runs ahead: the error is the other way, its sign is flipped"
             yield Finding(

@@ -4,7 +4,7 @@ import re
 import shlex
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,7 +47,6 @@ def choose_columns(
     ``columns`` has given names by role, which may leave out the unit that the file's have, and of an ``"error"``, which
     is then in the place of a position; ``unit`` is the positions'; ``axis`` one of several, by the format's name or the
     columns' names (``X1`` of ``X1_CommandPosition``); ``time_needed`` whether a time column must be there.
-
     LogError if a column is missing, occurs twice, or its unit is unknown or contradicts the given one.
     """
     for role in columns or ():
@@ -79,13 +78,8 @@ def choose_columns(
         raise _missing(source, {role: given.get(role, role) for role in chosen if role not in names})
     for role, name in names.items():
         if source.names.count(name) > 1:
-            raise LogError(
-                f"{source.path}: column {brief(name)} must occur once, got it {source.names.count(name)} times"
-            )
-        own = None if role == told and position_unit(_stated(source, name)) else unit
-        found[role] = _time(source, name) if role == "t" else _position(source, name, own)
-    if told:
-        found[told] = replace(found[told], error=sign)
+            raise LogError(f"{source.path}: column {brief(name)} must occur once, got {source.names.count(name)}")
+        found[role] = _time(source, name) if role == "t" else _position(source, name, unit, sign * (role == told))
     x_d, x = found["x_d"], found["x"]
     if x_d.unit.si != x.unit.si:
         raise LogError(
@@ -104,14 +98,11 @@ def _told_by_error(source: Source, chosen: dict[str, str | None], given: dict[st
     told = "x" if chosen["x_d"] and "x" not in given else "x_d"
     name = _name(source, "error", error)
     sign, name = (1, name) if name else (-1, _name(source, "error", error.removeprefix("-")))
-    chosen[told] = name
-    given[told] = error
+    chosen[told], given[told] = name, error
     of, way = brief(chosen["x_d" if told == "x" else "x"]), "+" if (told == "x_d") == (sign > 0) else "−"
-    source.remarks = [
-        *source.remarks,
-        f"{told} = {of} {way} {brief(name)}, an error that is "
-        f"{'commanded − measured' if sign > 0 else 'measured − commanded'}; the other way: {error_option(error, -1)}",
-    ]
+    is_what = "commanded − measured" if sign > 0 else "measured − commanded"
+    said = f"{told} = {of} {way} {brief(name)}, an error that is {is_what}; the other way: {error_option(error, -1)}"
+    source.remarks = [*source.remarks, said]
     return told, sign
 
 
@@ -121,10 +112,7 @@ def error_option(name: str, sign: int = 1) -> str:
 
 
 def signal_columns(source: Source, columns: Mapping[str, Column]) -> dict[str, Column]:
-    """Return the columns of a controller's own signals beside a pair, by what they are; in its unit if they state none.
-
-    Of formats whose columns have rates of their own there are none.
-    """
+    """Return a controller's own signals beside a pair, by what they are, in its unit if they state none."""
     found = {} if source.times else signals_of(source.names, columns["x"].name)
     units = {what: position_unit(_stated(source, name)) or columns["x_d"].unit for what, name in found.items()}
     return {what: Column(name, units[what], True) for what, name in found.items()}
@@ -227,10 +215,9 @@ def _row_labels(source: Source) -> str | None:
 def _check_names(source: Source) -> None:
     plain = [name.partition("#")[0] for name in source.names]
     if plain and all(is_number(name) or stamp_kind(name) for name in plain):
-        kinds = "t,x_d,x" if len(source.names) == 3 else "t,x_d,x and what the others are"
         raise LogError(
             f"{source.path}: has no line of names, its first line is numbers ({listed(plain)}); put one above, such as "
-            f"{kinds}: time, commanded and measured position, with units if they are not SI, as in x_d [mm]"
+            "t,x_d,x: time, commanded and measured position, with units if they are not SI, as in x_d [mm]"
         )
 
 
@@ -275,24 +262,20 @@ def _time(source: Source, name: str) -> Column:
     return Column(name, unit, bool(text))
 
 
-def _position(source: Source, name: str, given: str | None) -> Column:
+def _position(source: Source, name: str, given: str | None, error: int) -> Column:
+    it = f"{source.path}: column {brief(name)}"
     if name in source.stamps:
-        raise LogError(
-            f"{source.path}: column {brief(name)} must be a position, it holds timestamps; name another: --x_d NAME, "
-            "--x NAME"
-        )
+        raise LogError(f"{it} must be a position, it holds timestamps; name another (--x_d, --x)")
     text = _stated(source, name)
     unit = position_unit(text) if text else None
+    given = None if error and unit is not None else given  # an error may have a unit of its own
     counts = plain_name(text) in _COUNTS or (given is not None and unit is None and not _OTHERS.search(text))
     if counts and given is None:
-        raise LogError(
-            f"{source.path}: column {brief(name)} is in encoder counts; give the length of one, such as unit='0.1um' "
-            "(--unit 0.1um)"
-        )
+        raise LogError(f"{it} is in encoder counts; give the length of one, such as unit='0.1um' (--unit 0.1um)")
     if text and unit is None and not counts:
         raise LogError(
-            f"{source.path}: column {brief(name)} must be a position in one of {', '.join(POSITION_UNITS)}, its unit "
-            f"is {brief(text)}; is it another quantity? Name another column (--x_d NAME, --x NAME), or give it (--unit)"
+            f"{it} must be a position in one of {', '.join(POSITION_UNITS)}, its unit is {brief(text)}; is it another "
+            "quantity? Name another column (--x_d NAME, --x NAME), or give it (--unit)"
         )
     chosen = position_unit(given) if given is not None else None
     if unit is not None and chosen not in (None, unit):
@@ -301,7 +284,7 @@ def _position(source: Source, name: str, given: str | None) -> Column:
             f"{brief(text)}; leave the unit out, or correct the file"
         )
     chosen = chosen or unit or position_unit(source.assumed_units.get(name, ""))
-    return Column(name, chosen or POSITION_UNITS["m"], chosen is not None)
+    return Column(name, chosen or POSITION_UNITS["m"], chosen is not None, error)
 
 
 @dataclass(frozen=True)
@@ -337,10 +320,7 @@ def side_by_side(source: Source, columns: Mapping[str, Column], *, resample: boo
     Where commanded and measured position have times of their own that differ, both are taken at the times of the one
     that is sampled more slowly, between its first and last time in which there are both; the other is interpolated
     linearly, and refused where it has a gap: nothing is invented between samples.
-
-    Times that differ are refused unless ``resample`` is set.
-
-    LogError if the times differ and are not to be resampled, or cannot be.
+    LogError if the times differ and ``resample`` is not set, or they cannot be.
     """
     names = {role: column.name for role, column in columns.items()}
     x_d, x = names["x_d"], names["x"]

@@ -91,9 +91,7 @@ def _reader(path: Path, head: bytes) -> type[Source]:
     named = [reader for reader in READERS[:-1] if path.name.lower().endswith(reader.endings)]
     known = ", ".join(dict.fromkeys(reader.format for reader in READERS))
     if named and path.name.lower().endswith((".csv", ".txt", ".log")):  # of which no other reader says what is damaged
-        raise LogError(
-            f"{path}: is binary, though its name says text: none of the formats that are read ({known}); {_SAVE}"
-        )
+        raise LogError(f"{path}: is binary, though its name says text: none of the formats read ({known}); {_SAVE}")
     if named:
         return named[-1]  # its message says what is damaged
     raise LogError(f"{path}: is in no format that is read ({known}); {_SAVE}")

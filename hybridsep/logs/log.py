@@ -11,7 +11,7 @@ from functools import partial
 from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,14 +27,7 @@ from .source import Block, Source
 from .times import NOT_LATER, Times, recorded_times
 from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated_unit
 
-
-class Table(Protocol):
-    """Table of named columns, as pandas' and polars' DataFrame."""
-
-    columns: Any
-
-    def __getitem__(self, name: Any, /) -> Any:
-        """Return a column, of which NumPy makes an array."""
+Table = Any  # of pandas, polars, Arrow or xarray, or a structured array
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +149,8 @@ def read_log(
         raise LogError(f"a log is a file, a mapping of columns or a table, got {got}; x beside x_d?")
     path = source.path
     chosen = choose_columns(source, columns, unit, axis=axis, time_needed=given is None)
-    if not chosen["x_d"].error:  # else a command's sample is missing with either of them
+    pair = {role: chosen[role] for role in ("x_d", "x")}
+    if not pair["x_d"].error:  # else a command's sample is missing with either of them
         source.commanded, source.measured = chosen["x_d"].name, chosen["x"].name
     _check_twins(source, chosen)
     chosen = {**chosen, **signal_columns(source, chosen)}
@@ -166,10 +160,8 @@ def read_log(
     own = {what: chosen[what].unit.factor * read[what] for what in SIGNALS if what in chosen}
     signals = {what: values for what, values in own.items() if not np.isnan(values).all()}
     x_d, x_meas = (chosen[role].unit.factor * read[role] for role in ("x_d", "x"))
-    if (sign := chosen["x"].error) != 0:
-        x_meas = x_d - sign * x_meas
-    elif (sign := chosen["x_d"].error) != 0:
-        x_d = x_meas + sign * x_d
+    x_meas = x_d - e * x_meas if (e := pair["x"].error) else x_meas
+    x_d = x_meas + e * x_d if (e := pair["x_d"].error) else x_d
     time = chosen.get("t")
     if time is None:
         T_s = given or 0.0  # given, as there is no time
@@ -183,7 +175,7 @@ def read_log(
         file_unit=chosen["x_d"].unit.name,
         n_recorded=len(x_d),
         T_recorded=times.T_s,
-        columns=dict(_as_given(role, chosen[role]) for role in ("x_d", "x")),
+        columns={"error" if one.error else role: "-" * (one.error < 0) + one.name for role, one in pair.items()},
         signals=signals,
     )
     remarks = [*source.remarks, resampling, repeats, *_guessed(source, chosen, columns or {}), *source.notes()]
@@ -223,9 +215,7 @@ def _checked(path: Path, block: Block, columns: Mapping[str, Column]) -> dict[st
             i = int(np.argmax(wrong))
             raise LogError(f"{path}, {block.where(i)}: column {brief(column.name)} must be finite, got {read[role][i]}")
     if np.isnan(read["x"]).all():
-        raise LogError(
-            f"{path}: the measured position is missing (NaN) in all {n} samples; name its column (--x), or record it"
-        )
+        raise LogError(f"{path}: the measured position is missing (NaN) in all {n} samples; name its column (--x)")
     return read
 
 
@@ -245,21 +235,12 @@ def _without_repeats(read: dict[str, Array]) -> tuple[dict[str, Array], str]:
 
 
 def _check_alternation(path: Path, t: Array, x_d: Array, x: Array) -> None:
-    """Raise LogError if rows of k axes follow each other: times repeat, and positions move far less over k rows.
-
-    Those of one that repeats its motion while a coarse time stays move over 2 rows about twice as far as over 1.
-    """
+    """Raise LogError if rows of k axes follow each other: times repeat, and positions move far less over k rows."""
     k = round(len(t) / (np.count_nonzero(np.diff(t)) + 1))
-    moved = [[np.nansum(np.abs(one[n:] - one[:-n])) for n in (k, 1, 2)] for one in (x_d, x)]
-    if 1 < k < len(t) and all(
-        over_k < 0.2 * over_1 and (k == 2 or over_1 > 0.6 * over_2) for over_k, over_1, over_2 in moved
-    ):
+    both = np.stack((x_d, x))
+    over_k, over_1, over_2 = (np.nansum(np.abs(both[:, n:] - both[:, :-n]), axis=1) for n in (k, 1, 2))
+    if 1 < k < len(t) and (over_k < 0.2 * over_1).all() and (k == 2 or (over_1 > 0.6 * over_2).all()):  # not smooth
         raise LogError(f"{path}: rows of {k} axes follow each other; write those of one into a file of their own")
-
-
-def _as_given(role: str, column: Column) -> tuple[str, str]:
-    """Return a position's role and name, of an error in its place ``"error"`` and the name with its sign."""
-    return ("error", f"{'-' if column.error < 0 else ''}{column.name}") if column.error else (role, column.name)
 
 
 def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, str]) -> Iterator[str]:
@@ -268,10 +249,7 @@ def _guessed(source: Source, columns: Mapping[str, Column], given: Mapping[str, 
     roles = [role for role in ("x_d", "x") if role not in given and "error" not in given]
     if any(stated_unit(columns[role].name)[0] not in known for role in roles):
         x_d, x = brief(columns["x_d"].name), brief(columns["x"].name)
-        yield (
-            f"columns {x_d} and {x} are read as the commanded and the measured position; columns (--x_d, --x) name "
-            "others"
-        )
+        yield f"columns {x_d} and {x} are read as the commanded and the measured position (--x_d, --x)"
 
 
 def _check_twins(source: Source, columns: Mapping[str, Column]) -> None:
@@ -296,9 +274,7 @@ def _check_twins(source: Source, columns: Mapping[str, Column]) -> None:
 def check_reading(unit: str | None, T_s: float | None) -> float | None:
     """Return the given sampling interval, validated; LogError for an unknown unit."""
     if unit is not None and (not isinstance(unit, str) or position_unit(unit) is None):
-        raise LogError(
-            f"unit must be one of {', '.join(POSITION_UNITS)}, got {brief(unit)}; a multiple of one is said as 0.1um"
-        )
+        raise LogError(f"unit must be one of {', '.join(POSITION_UNITS)}, got {brief(unit)}; a multiple is 0.1um")
     return None if T_s is None else float(check("T_s", T_s))
 
 

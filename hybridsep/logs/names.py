@@ -35,21 +35,8 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 _SOLL, _IST = {"sollposition", "solllage", "lagesollwert"}, {"istposition", "istlage", "lageistwert"}
 _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "sp", "des", "desired", "target"}
 _COMMANDED |= {"goal", "commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"} | _SOLL
-_MEASURED = {
-    "present",
-    "act",
-    "actual",
-    "meas",
-    "measured",
-    "measurement",
-    "fb",
-    "feedback",
-    "enc",
-    "encoder",
-    "pv",
-    "ist",
-} | _IST
-_MEASURED |= {"mesure", "istwert"}
+_MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "pv", "ist"} | _IST
+_MEASURED |= {"mesure", "istwert", "present"}
 _ESTIMATED = {"estimate", "estimated"}  # measured where nothing else is
 _POSITION = {"pos", "position", "positions", "lage", "angle", "pl", "pctrl", "pulses"} | _SOLL | _IST
 _FILLING = {"axis", "value", "values", "data", "state", "states", "current"}
@@ -57,16 +44,15 @@ _SENT = {"control", "input"}  # commanded beside a word for the position, else a
 _VELOCITY = {"vel", "velo", "velocity", "velocities", "speed", "speeds", "geschwindigkeit"}
 _ERROR = {"error", "err", "errors", "diff", "posdiff", "deviation", "droop", "schleppfehler", "schleppabstand"}
 _ERROR |= {"fe", "ferr", "ferror", "poserr"}
+_LATER = re.compile("target|tpos|goal|planned|nominal", re.IGNORECASE)  # of a whole move or of another instant
 _NO_POSITION = _VELOCITY | _ERROR | {"acc", "acceleration", "accelerations", "jerk", "torque", "frequency"}
 _TIME = {"time", "timestamp", "zeit", "zeitstempel", "temps"}
 """Words within names, in small letters; what is left of a name beside those of positions and what fills is the axis."""
 
 _SHORT = {"rpos": "ref pos", "fpos": "fb pos", "dpos": "ref pos", "mpos": "fb pos", "tpos": "ref pos"}
 _SHORT |= {"apos": "estimate pos", "pcmd": "pos cmd", "posf": "pos fb", "s": "pos", "_rp": "ref pos ", "_tp": "fb pos "}
-_WHOLE = re.compile(
-    r"(?<![a-z])([rfdmta]pos|pcmd|posf|^s(?=[ _](?:noml|act)))(?![a-z])|^_[rt]p(?=[a-hw-z]$)|\(?0x[\da-f]+\)?",
-    re.IGNORECASE,
-)
+_WORDS = r"(?<![a-z])([rfdmta]pos|pcmd|posf|^s(?=[ _](?:noml|act)))(?![a-z])|^_[rt]p(?=[a-hw-z]$)"
+_WHOLE = re.compile(rf"{_WORDS}|\(?0x[\da-f]+\)?", re.IGNORECASE)
 """Whole words of ACS, Trio, Technosoft (``APOS``, in ACS a command, is measured where nothing else is), Fanuc,
 Heidenhain and Galil that stand for two; and numbers of CANopen's objects, which say nothing."""
 
@@ -92,20 +78,14 @@ def n_known(names: Sequence[str]) -> int:
     return sum(bool(known_names(role, names)) for role in ROLES) + 2 * len(axes_of(names))
 
 
-_ByAxis = dict[str, str]
-
-
-def _by_words(names: Sequence[str]) -> tuple[_ByAxis, _ByAxis, tuple[list[str], list[str]]]:
+def _by_words(names: Sequence[str]) -> tuple[dict[str, str], dict[str, str], tuple[list[str], list[str]]]:
     """Return commanded and measured positions by axis, and those of either kind that have a word for the position."""
     commanded: dict[str, str] = {}
     measured: dict[str, str] = {}
     estimated: dict[str, str] = {}
     positions: dict[str, str] = {}  # of columns that say nothing else, joint_pos_1 beside joint_pos_target_1
     whole: dict[str, list[str]] = {"x_d": [], "x": []}
-    # That of a whole move or of another instant, where there is another
-    for name in sorted(
-        names, key=lambda one: any(word in one.lower() for word in ("target", "tpos", "planned", "nominal", "goal"))
-    ):
+    for name in sorted(names, key=lambda one: bool(_LATER.search(one))):
         if column := _COLUMN.search(stated_unit(name)[0]):  # of a matrix that is called x_d
             known = [_spelling(name[: column.start()]) in _NAMES[role] for role in ("x_d", "x")]
             if any(known):
@@ -150,8 +130,8 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
 def lone_position(names: Sequence[str]) -> dict[str, str]:
     """Return the only commanded position by its role, or the only measured one; empty where there are none."""
     commanded, measured, _ = _by_words(names)
-    found = {"x_d": list(commanded.values())} if commanded else {"x": list(measured.values())}
-    return {role: one[0] for role, one in found.items() if len(one) == 1}
+    only = list((commanded or measured).values())
+    return {"x_d" if commanded else "x": only[0]} if len(only) == 1 else {}
 
 
 def signals_of(names: Sequence[str], measured: str) -> dict[str, str]:

@@ -38,9 +38,7 @@ _NO_UNITS = ("", "-", "1", "[-]")  # entries of a row of units where a column ha
 _BLANK = -math.inf  # stands for a blank cell of the command until it is filled
 _APART = 0.9  # share of rows with one of the two positions from which on channels have times of their own
 
-_MISSING = re.compile(
-    r"[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?n/a|<na>|null|none|-{1,3}", re.IGNORECASE
-)
+_MISSING = re.compile(r"(?i)[+-]?(nan(\(\w*\))?|1\.#(q|s)?nan\w*|1\.#ind\w*)|#?na|#?n/a|<na>|null|none|-{1,3}")
 """Spellings of a missing number: of C libraries, R, databases, Excel and pandas; and dashes."""
 
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?")
@@ -95,8 +93,7 @@ class TextSource(Source):
     """Text with a line of column names, then numbers, delimited by comma, semicolon, tab, bar or blanks.
 
     Preamble, comments and a row of units are skipped, decimal commas are read; columns of timestamps become seconds.
-    UTF-8, UTF-16 or Latin-1, plain or in gzip. A blank cell of the command is as before, as
-    controllers' traces write it.
+    UTF-8, UTF-16 or Latin-1, plain or in gzip. A blank cell of the command is as before, as in controllers' traces.
     """
 
     format = "text"
@@ -175,16 +172,14 @@ class TextSource(Source):
 
     def _filled(self, column: Array, measured: Array | None, numbers: Sequence[int]) -> Array:
         """Return the command with what is blank as before, which is noted; LogError if it is where x is measured."""
-        blank = column == _BLANK
+        blank, name = column == _BLANK, brief(self.commanded)
         if measured is not None and blank.any() and (blank != np.isnan(measured)).mean() > _APART:
             raise LogError(
-                f"{self.path}: rows have either {brief(self.commanded)} or {brief(self.measured)}: channels with times "
-                "of their own; export them with a common time, or fill the gaps, as interpolate() of pandas does"
+                f"{self.path}: rows have either {name} or {brief(self.measured)}: channels with times of their own; "
+                "export them with a common time, or fill the gaps, as interpolate() of pandas does"
             )
         if blank[:1].any():
-            raise LogError(
-                f"{self.path}, line {numbers[0]}: column {brief(self.commanded)} must be a number, got nothing"
-            )
+            raise LogError(f"{self.path}, line {numbers[0]}: column {name} must be a number, got nothing")
         last = np.maximum.accumulate(np.where(blank, 0, np.arange(len(column))))
         self._held = int(blank.sum())
         return column[last]
@@ -200,9 +195,7 @@ class TextSource(Source):
                 f"{brief(text.strip())}"
             )
         if self._held:
-            notes.append(
-                f"column {brief(self.commanded)} is blank in {self._held} rows: read as before, as a trace of changes"
-            )
+            notes.append(f"column {brief(self.commanded)} is blank in {self._held} rows: read as before, as in a trace")
         return notes
 
     def _open(self) -> IO[str]:
@@ -404,9 +397,7 @@ def _width(fields: Sequence[str]) -> int:
     return len(fields) if numbers and numbers >= sum(not stamp_kind(text) for text in others) else 0
 
 
-def _with_names(
-    rows: Sequence[tuple[int, list[str], str]], start: int, end: int, delimiter: str | None
-) -> _Table | None:
+def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int, mark: str | None) -> _Table | None:
     """Return the table of a run of rows below its names, and perhaps a row of units; None without them."""
     fields = [row for _, row, _ in rows[start:end]]
     width = len(fields[0])
@@ -414,8 +405,8 @@ def _with_names(
     kinds = [_kind([row[i] for row in fields]) for i in range(width)]
     above: list[tuple[int, list[str]]] = []
     for number, _, line in reversed(rows[:start]):
-        names = _names(line, delimiter)
-        if delimiter is None and len(names) == width - 1 and ("date", "time") in pairwise(kinds):
+        names = _names(line, mark)
+        if mark is None and len(names) == width - 1 and ("date", "time") in pairwise(kinds):
             i = list(pairwise(kinds)).index(("date", "time"))  # one name for both
             names = [*names[:i], f"{names[i]} (date)", *names[i:]]
         while len(names) > width - blank and not names[-1]:
@@ -438,7 +429,7 @@ def _with_names(
     comma, settled = _comma_of([[row[i] for row in fields] for i in range(width)])
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
-    return _Table(names, stated, delimiter, comma, settled, header, rows[start][0], clocks)
+    return _Table(names, stated, mark, comma, settled, header, rows[start][0], clocks)
 
 
 def _is_written(text: str) -> bool:

@@ -141,11 +141,10 @@ def _rows(path: Path, name: str, t: Array, given: float | None, remarks: tuple[s
 def _unknown_unit(path: Path, name: str, first: float, interval: float, *, counts: bool) -> LogError:
     """Return the error of times that state no unit and are not in seconds, with the intervals that they may have."""
     units = [unit for unit, size in _CLOCKS.items() if _PLAUSIBLE[0] <= size * interval <= _PLAUSIBLE[1]]
-    latest = {"100 ns": 1e11, "d": 1e11}  # since 1601 or 1 in Windows, 1900 in Excel, 0 in MATLAB
-    since = next((unit for unit in units if 3e8 < first * _CLOCKS[unit] < latest.get(unit, 1e10)), "")  # 1980 to 2286
+    earlier = ("100 ns", "d")  # since 1601 or 1 in Windows, 1900 in Excel, 0 in MATLAB; others since 1970, to 2286
+    since = next((unit for unit in units if 3e8 < first * _CLOCKS[unit] < (1e11 if unit in earlier else 1e10)), "")
     units = [since] if since else [name] if name in _CLOCKS else units
-    epoch = " since 1970" if since and since not in latest else ""
-    guess = f", or a time in {units[0]}{epoch}" if units else ""
+    guess = f", or a time in {units[0]}{'' if since in ('', *earlier) else ' since 1970'}" if units else ""
     hint = f"--T_s {interval * _CLOCKS[units[0]]:.4g}" if units else ""
     named = units[0] if units else "ms"
     how = f", or name its unit in the file, '{name:.60} [{named}]'" if time_unit(named) else ""

@@ -58,9 +58,7 @@ class Machine(FileSection):
         if isinstance(self.plant, StageSection) and not self.physics.mode:
             raise ParameterError("a plant of kind stage needs [[physics.mode]] entries")
         if isinstance(self.plant, FeedDriveSection | StageSection) and (self.unit != "m" or self.physics.dead_time):
-            raise ParameterError(
-                "a machine with a plant of kind feed_drive or stage must have unit = 'm' and physics.dead_time = 0"
-            )
+            raise ParameterError("a plant of kind feed_drive or stage must have unit = 'm' and physics.dead_time = 0")
         if self.plant is not None:
             self.new_plant()  # raises if the combination is out of range
         _ = self.model  # raises if the mode of m, c and k is out of range
@@ -308,9 +306,7 @@ def machine_name(path: Path, axis: str | None = None) -> str:
     name = re.sub(r"[^A-Za-z0-9]+", "_", f"{stem.stem} {axis or ''}").strip("_")
     name = name if re.match(r"[A-Za-z]", name) else f"axis_{name}".rstrip("_")
     if not re.fullmatch(NAME_PATTERN, name):
-        raise ParameterError(
-            f"an axis's name must have at most 100 letters, the log's gives {brief(name)}; give a --name"
-        )
+        raise ParameterError(f"an axis's name must have at most 100 letters, the log's is {brief(name)}; give a --name")
     return name
 
 

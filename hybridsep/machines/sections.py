@@ -223,9 +223,7 @@ class Physics(Section):
     def check(self) -> None:
         """Raise ParameterError unless there is one of them."""
         if sum(map(bool, (self.mode, self.spring_mass_damper, self.cascade))) != 1:
-            raise ParameterError(
-                "give either [[physics.mode]] entries or one [physics.spring_mass_damper] or [physics.cascade]"
-            )
+            raise ParameterError("give [[physics.mode]] entries, [physics.spring_mass_damper] or [physics.cascade]")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -121,9 +121,7 @@ def read_path(path: str | Path, limits: Limits, T_s: float, unit: str | None = N
         joined = moves[-1].joined(move) if moves else None
         moves[-1:] = [joined] if joined else [*moves[-1:], move]
     if not any(move.feed < inf for move in moves):
-        raise LogError(
-            f"{Path(path).name} has no move in X or Y at a feed: G1, G2 or G3 with a coordinate that changes"
-        )
+        raise LogError(f"{Path(path).name} has no move in X or Y at a feed: G1, G2, G3 with a coordinate that changes")
     pieces = [move.points(limits, T_s) for move in moves]
     sizes = [1, *map(len, pieces)]
     full = [move.centre if abs(move.sweep) > 2 * np.pi - 1e-6 else None for move in moves]

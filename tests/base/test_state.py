@@ -89,7 +89,7 @@ def test_another_kind() -> None:
 @pytest.mark.parametrize("version", [0, VERSION + 1, 2**32 - 1])
 def test_another_version(version: int) -> None:
     other = BLOB[:4] + struct.pack("<I", version) + BLOB[8:-4]
-    with pytest.raises(StateError, match=f"has format version {version}, this library reads version {VERSION}"):
+    with pytest.raises(StateError, match=f"has format version {version}, this library reads {VERSION}"):
         unpack("test", other + struct.pack("<I", zlib.crc32(other)))  # else it would pass for damaged
 
 

@@ -123,9 +123,7 @@ def test_ssp_2_has_the_twins_of_fmi_3(tmp_path: Path) -> None:
     """SSP 2.0 has the namespaces of 1.0; without its version and the types of FMI 3.0 it is the same document."""
     machine, command = load_machine("spring_mass_damper"), staircase()[:100]
     old, new = (
-        content(
-            build_system(machine, tmp_path / f"{ssp}.ssp", command, targets=("host",), compensate="hybrid", ssp=ssp)
-        )
+        content(build_system(machine, tmp_path / f"{ssp}.ssp", command, targets=["host"], compensate="hybrid", ssp=ssp))
         for ssp in ("1", "2")
     )
     names = {name: name.replace(".fmu", "Fmi3.fmu") for name in old}

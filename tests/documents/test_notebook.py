@@ -39,9 +39,7 @@ def test_a_log_becomes_a_compensated_loop_in_ten_cells(tmp_path: Path, monkeypat
 def test_a_kernel_shows_a_figure_as_a_picture() -> None:
     run_kernel = pytest.importorskip("jupyter_client.manager").run_kernel
     shown: list[dict[str, Any]] = []
-    cell = (
-        "from hybridsep.base.metrics import line_plot\nline_plot([0.0, 1.0], {'error': [0.0, 2.0]}, 't [s]', 'e [µm]')"
-    )
+    cell = "from hybridsep.base.metrics import line_plot\nline_plot([0.0, 1.0], {'error': [0.0, 2.0]}, 't [s]', 'e')"
     with run_kernel(kernel_name="python3") as client:
         client.execute_interactive(cell, timeout=120, output_hook=lambda message: shown.append(message["content"]))
     (data,) = (one["data"] for one in shown if "data" in one)

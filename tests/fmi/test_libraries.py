@@ -61,7 +61,7 @@ def test_without_compiler_and_libraries_build_says_what_to_do(without: Path, hyb
     assert "no C compiler: no ziglang and none of $CC, cc, gcc, clang; pip install ziglang" in " ".join(error.split())
     error = hybridsep.refused("build", "FeedDrive", "--target", "win64", "--out", without)
     pinned = ZIG.replace(" ", "==")
-    needs = f"compiling for x86_64-windows needs ziglang: pip install {pinned}, or ask for the target host"
+    needs = f"compiling for x86_64-windows needs ziglang: pip install {pinned}, or --target host"
     assert needs in " ".join(error.split())
 
 

@@ -64,9 +64,7 @@ def test_an_empty_state_is_refused(tmp_path: Path) -> None:
 
 
 def test_weights_and_samples_have_one_model_each(tmp_path: Path) -> None:
-    with pytest.raises(
-        FmuError, match="weights are for a HybridPredictor or a SepCompensator, FeedDrive is a FeedDrive"
-    ):
+    with pytest.raises(FmuError, match="weights are for a HybridPredictor or a SepCompensator, FeedDrive is"):
         build(tmp_path, trained_state(PREDICTOR), "FeedDrive")
     with pytest.raises(FmuError, match="samples are for a ReferenceTrajectory, FeedDrive is a FeedDrive"):
         build_fmu(MACHINE, "FeedDrive", tmp_path, samples=[0.0])

@@ -185,9 +185,7 @@ def test_a_rapid_is_followed_late(folder: Path, faster: float, enable: bool) -> 
 
 
 def test_states_and_what_they_end_with(folder: Path) -> None:
-    run = Run(
-        Component(changed(folder, "timed", ("[compensator]", "[compensator]\nmeasurement_timeout = 0.1")), folder)
-    )
+    run = Run(Component(changed(folder, "late", ("[compensator]", "[compensator]\nmeasurement_timeout = 0.1")), folder))
 
     def states(periods: int, fb: float | None = None, **pins: float) -> list[int]:
         first = len(run.shown)

@@ -150,7 +150,7 @@ def test_bad_arrays(tmp_path: Path, suffix: str, bad: Columns, message: str) -> 
 def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "log.parquet", columns())
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    refused(r"log.parquet: is a Parquet file, which needs the extra parquet: pip install 'hybridsep\[parquet\]'$", path)
+    refused(r"log.parquet: is a Parquet file, which needs: pip install 'hybridsep\[parquet\]'$", path)
 
 
 def test_nulls_times_structs_and_decimals(tmp_path: Path) -> None:

@@ -253,14 +253,7 @@ def test_an_index_with_a_gap_takes_the_given_interval(tmp_path: Path) -> None:
         (1.7e9 * 1e3 + 4.0 * np.arange(N), 4e-3),
         (np.arange(N) * 2.0, 2e-3),
     ],
-    ids=[
-        "two decimals",
-        "three times",
-        "single precision",
-        "ms since 1970",
-        "ms since 1970 at 250 Hz",
-        "ms at 500 Hz",
-    ],
+    ids=["two decimals", "three times", "single precision", "ms since 1970", "ms since 1970 at 250 Hz", "ms at 500 Hz"],
 )
 def test_what_times_do_not_tell_is_asked_for(tmp_path: Path, t: Array, T_s: float) -> None:
     """Times that are rounded, or whose unit is not stated, with the line to paste, and what it gives."""

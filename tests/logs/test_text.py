@@ -135,9 +135,7 @@ def test_a_trace_of_changes() -> None:
     log = read_log(CASES / "sinumerik_axis7_blank_cells.csv")
     assert (len(log.t), log.T_s, log.unit, int(np.isnan(log.x_meas).sum())) == (3000, 2e-3, "rad", 1500)
     assert not log.x_d.any()
-    assert log.remarks[-1] == (
-        "column 'Position setpoint [deg]' is blank in 2999 rows: read as before, as a trace of changes"
-    )
+    assert log.remarks[-1] == ("column 'Position setpoint [deg]' is blank in 2999 rows: read as before, as in a trace")
 
 
 @pytest.mark.parametrize("name", ["rownames_R", "trail_header_only", "trail_rows_only", "trail_semicolon_rows"])

@@ -63,9 +63,7 @@ def scripts(archives: Path, session_folder: Path) -> Path:
         (wheel,) = (archives / "wheel").iterdir()
         pip = [sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", "--no-index"]
         output_of(*pip, wheel, cwd=folder)
-        place = Path(
-            output_of(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=folder).strip()
-        )
+        place = Path(output_of(python, "-c", "import sysconfig as s; print(s.get_path('purelib'))", cwd=folder).strip())
         shared = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
         without_zig = 'import sys; sys.modules["ziglang"] = None'
         (place / "shared.pth").write_text("\n".join([*shared, without_zig, ""]), encoding="utf-8")
