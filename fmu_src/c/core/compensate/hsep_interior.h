@@ -184,8 +184,7 @@ static hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_spline
 /* B of x or dx, (n,), to ds. */
 static void interior_rows(hsep_problem it, const hsep_real x[])
 {
-    hsep_knots_widen(it.knots, x, it.c);
-    hsep_splines_rows(it.splines, it.c, it.first, it.low);
+    hsep_knots_rows(it.knots, it.splines, x, it.c, it.low);
     interior_take_rows(it, it.low, it.low, it.ds);
 }
 

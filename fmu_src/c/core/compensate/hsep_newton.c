@@ -356,7 +356,8 @@ static hsep_int newton_of_columns(hsep_newton *self, const hsep_newton_task *tas
 {
     const hsep_int full = NEWTON_COLUMNS * hsep_linearised_experts(task->model);
     const int begins = first == hsep_knots_at(&task->planner->knots, first).first;
-    return newton_parts(full * (self->preview - newton_begins(self)[first]), self->preview) + (begins ? NEWTON_SOME : 0);
+    return newton_parts(full * (self->preview - newton_begins(self)[first]), self->preview) +
+           (begins ? NEWTON_SOME : 0);
 }
 
 /* What all parts of the longest plan count as, samples of whose window are predicted already. A second length of a
@@ -422,9 +423,8 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
 #define NEWTON_VARY(where, end) \
     while (self->samples < (end)) { \
         NEWTON_YIELD( \
-            where, self->samples > self->late + self->Np \
-                       ? NEWTON_APART \
-                       : NEWTON_SOME + (self->samples > 0 ? 0 : NEWTON_PASS)); \
+            where, self->samples > self->late + self->Np ? NEWTON_APART \
+                                                         : NEWTON_SOME + (self->samples > 0 ? 0 : NEWTON_PASS)); \
         newton_vary(self, task, c); \
     }
 
@@ -478,14 +478,10 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
             NEWTON_SOLVE(6, 7, planner->steps);
         }
 
-        /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
+        /* Newton steps, the first from the remainder of the last plan, each from the one before as long as they gain */
         newton_copy(self, hsep_at(self, self->best), rest);
         self->gains = 1;
-        for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
-            if (!self->gains) { /* what was predicted last was no better */
-                self->left += 2 * NEWTON_PREDICTION;
-                NEWTON_PREDICT(8, 9, hsep_at(self, self->best));
-            }
+        for (self->steps = 0; self->follows && self->gains && self->steps < self->n_steps; self->steps++) {
             NEWTON_YIELD(10, NEWTON_SOME);
             newton_copy(self, c, hsep_at(self, self->best));
             hsep_planner_open(planner, task->x_d, 1, self->bound); /* the model follows the friction */

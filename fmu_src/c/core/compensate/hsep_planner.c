@@ -162,9 +162,7 @@ static hsep_int planner_first(const hsep_planner *self) { return hsep_planner_sp
 /* Rows of splines x, (m,), of this cost. */
 static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows[])
 {
-    hsep_real *c = planner_problem(self).c;
-    hsep_knots_widen(&self->solved, x, c);
-    hsep_splines_rows(hsep_planner_splines(self), c, planner_first(self), rows);
+    hsep_knots_rows(&self->solved, hsep_planner_splines(self), x, planner_problem(self).c, rows);
 }
 
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)

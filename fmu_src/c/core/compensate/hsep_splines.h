@@ -135,36 +135,17 @@ static inline hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_re
     return sum;
 }
 
-/* delta, (preview,), of the splines first ... n - 1 with coefficients c, (n - first,). */
-static inline void splines_change(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real delta[])
+/* The rows of a change with coefficients c, (count,), of spline first - 3, whose last part acts, and those after it; (4
+ * preview,). */
+static inline void hsep_splines_rows(
+    const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int first, hsep_int preview, hsep_real rows[])
 {
-    const hsep_real *b = hsep_splines_shape(self);
-    const hsep_int spacing = self->spacing, count = self->n - first;
-    hsep_int k = first * spacing;
-    hsep_zero(delta, k);
-    for (hsep_int place = 0; k < self->preview; place++) { /* between two knots */
-        for (hsep_int within = 0; within < spacing && k < self->preview; within++, k++) {
-            delta[k] = 0.0;
-            for (hsep_int i = place < count ? 0 : place - count + 1; i <= HSEP_N_DECIDED && i <= place; i++) {
-                delta[k] += c[place - i] * b[within + i * spacing];
-            }
-        }
-    }
-}
-
-/* The rows of the splines first ... n - 1 with coefficients c, (n - first,). */
-static inline void hsep_splines_rows(const hsep_splines *self, const hsep_real c[], hsep_int first, hsep_real rows[])
-{
-    const hsep_int preview = self->preview;
-    splines_change(self, c, first, rows);
-    for (unsigned order = 1; order < HSEP_ORDERS; order++) {
-        const hsep_real *of = rows + (order - 1) * preview;
-        hsep_copy(rows + order * preview, of, preview);
-        hsep_axpy(rows + order * preview + 1, -1.0, of, preview - 1);
-    }
-    for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        for (hsep_int k = 0; k < preview; k++) {
-            rows[order * preview + k] *= self->share[order];
+    hsep_real now[HSEP_ORDERS] = {0.0};
+    const hsep_int begin = first * self->spacing;
+    for (hsep_int k = 0; k < preview; k++) {
+        hsep_differ(now, k < begin ? 0.0 : hsep_splines_sum(self, c, count, k - begin));
+        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
+            rows[order * preview + k] = now[order] * self->share[order];
         }
     }
 }
@@ -364,6 +345,15 @@ static inline void hsep_knots_widen(const hsep_knots *self, const hsep_real x[],
             c[knot.begin + j] += x[i] * knot.share[j];
         }
     }
+}
+
+/* Rows of a change by the splines x, (m,), m. c: work, (3 + n,). */
+static inline void hsep_knots_rows(
+    const hsep_knots *self, const hsep_splines *splines, const hsep_real x[], hsep_real c[], hsep_real rows[])
+{
+    hsep_zero(c, HSEP_N_DECIDED);
+    hsep_knots_widen(self, x, c + HSEP_N_DECIDED);
+    hsep_splines_rows(splines, c, HSEP_N_DECIDED + self->n, splines->n - self->n, splines->preview, rows);
 }
 
 /* h, (m,), += the transpose of hsep_knots_widen of g, (n,). */

@@ -88,18 +88,6 @@ static void stop_behind(const hsep_stop *self, hsep_real c[])
     }
 }
 
-/* Rows of a change with coefficients c, (count,) m, in shares, (4 preview,). */
-static void stop_rows(const hsep_stop *self, const hsep_splines *splines, const hsep_real c[], hsep_real rows[])
-{
-    hsep_real now[HSEP_ORDERS] = {0.0};
-    for (hsep_int k = 0; k < self->preview; k++) {
-        hsep_differ(now, hsep_splines_sum(splines, c, self->count, k));
-        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-            rows[order * self->preview + k] = now[order] * splines->share[order];
-        }
-    }
-}
-
 /* Share of the last stop's own part, nearest 0, with which all rows keep their bounds, so far on the way; NaN: none. */
 static hsep_real stop_share(const hsep_stop *self, const hsep_real low[], const hsep_real high[], hsep_real length)
 {
@@ -131,14 +119,14 @@ static void hsep_stop_carry_out(
     hsep_real length = 0.0, share = 1.0, too_long = 1.0, tried = 1.0;
     hsep_copy(own, last, first);
     stop_behind(self, own);
-    stop_rows(self, splines, own, start);
+    hsep_splines_rows(splines, own, self->count, 0, self->preview, start);
     for (hsep_int i = 0; i < self->count; i++) {
         own[i] = last[i] - own[i];
     }
-    stop_rows(self, splines, own, own_rows);
+    hsep_splines_rows(splines, own, self->count, 0, self->preview, own_rows);
     hsep_copy(now, plan, first);
     stop_behind(self, now);
-    stop_rows(self, splines, now, way);
+    hsep_splines_rows(splines, now, self->count, 0, self->preview, way);
     for (hsep_int r = 0; r < HSEP_ORDERS * self->preview; r++) {
         low[r] = hsep_fmin(low[r], start[r] + own_rows[r]) - HSEP_LIMITS_ROUNDING;
         high[r] = hsep_fmax(high[r], start[r] + own_rows[r]) + HSEP_LIMITS_ROUNDING;
