@@ -172,17 +172,6 @@ static void linearised_span(hsep_linearised *self, const hsep_real weights[], hs
     }
 }
 
-/* Share of an expert in the stack, sample after sample: what shrinking and bounds leave of its recursion. */
-static void linearised_shrink(const hsep_expert *expert, hsep_real weight, hsep_int n, hsep_real shrink[])
-{
-    const hsep_real *e_h = hsep_at_const(expert, expert->e_h), *unshrunk = hsep_at_const(expert, expert->unshrunk);
-    for (hsep_int k = 0; k < n; k++) {
-        const hsep_int j = n - 1 - k;
-        const hsep_real at_zero = hsep_at_const(expert, expert->shrinkage)[j];
-        shrink[k] = weight * (unshrunk[j] == 0.0 ? at_zero : e_h[j] / unshrunk[j]);
-    }
-}
-
 /* Response of an expert of the command to the increments of a change of n samples, from rest, (preview,). */
 static void linearised_of_increments(
     hsep_linearised *self, const hsep_expert *expert, hsep_int n, hsep_int dead_time, hsep_real to[])
@@ -289,8 +278,11 @@ static void hsep_linearised_at(
         const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
         const hsep_real of_model = linearised_weight(model, i, HSEP_MODEL_RESIDUAL);
         const hsep_real weight = of_model + linearised_weight(model, i, HSEP_COMMAND_RESIDUAL); /* one is 0 */
-        if (weight > 0.0) {
-            linearised_shrink(expert, weight, n, hsep_at(self, self->shrink) + i * n);
+        const hsep_real *e_h = hsep_at_const(expert, expert->e_h), *at_zero = hsep_at_const(expert, expert->shrinkage);
+        const hsep_real *unshrunk = hsep_at_const(expert, expert->unshrunk);
+        for (hsep_int k = 0, j = n - 1; weight > 0.0 && k < n; k++, j--) { /* what shrinking and bounds leave of it */
+            const hsep_real left = unshrunk[j] == 0.0 ? at_zero[j] : e_h[j] / unshrunk[j];
+            hsep_at(self, self->shrink)[i * n + k] = weight * left;
         }
         if (of_model > 0.0) {
             linearised_gains(
@@ -314,18 +306,6 @@ static void linearised_disturbance(hsep_linearised *self, hsep_int i, hsep_int f
     }
     for (hsep_int u = 0; u < moves; u++) {
         to[HSEP_PHYSICS_ABREAST * u] += gains[u] * v_d[u] + gains[n + u] * v_1[u];
-    }
-}
-
-/* The weights of the lags of an expert, each of them as often as a vector has lanes, and zeros behind them. */
-static void linearised_take_lags(hsep_linearised *self, const hsep_expert *expert)
-{
-    const hsep_real *weights = hsep_expert_weights(expert) + expert->n_static;
-    hsep_real *lags = hsep_at(self, self->lags);
-    for (hsep_int i = 0; i < expert->p + LINEARISED_TOGETHER - 1; i++) {
-        for (int l = 0; l < HSEP_LANES; l++) {
-            *lags++ = i < expert->p ? weights[i] : 0.0;
-        }
     }
 }
 
@@ -380,9 +360,11 @@ static void linearised_add(
     }
     hsep_physics_abreast(
         filters, HSEP_PHYSICS_ABREAST, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)padded);
-    linearised_take_lags(self, expert);
-    linearised_run(
-        hsep_at(self, self->lags), expert->p, hsep_at(self, self->drive), linearised_response(self, i), run, padded);
+    hsep_real *lags = hsep_at(self, self->lags); /* each as often as a vector has lanes, and zeros behind them */
+    for (hsep_int l = 0; l < HSEP_LANES * (expert->p + LINEARISED_TOGETHER - 1); l++) {
+        lags[l] = l < HSEP_LANES * expert->p ? hsep_expert_weights(expert)[expert->n_static + l / HSEP_LANES] : 0.0;
+    }
+    linearised_run(lags, expert->p, hsep_at(self, self->drive), linearised_response(self, i), run, padded);
     for (hsep_int c = 0; c < count; c++) {
         const hsep_int length = self->preview - first - c * spacing;
         const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - length);

@@ -111,15 +111,10 @@ static hsep_real newton_doubt(hsep_newton *self, const hsep_newton_task *task)
 /* Samples that the splines begin with, which are solved for. */
 static hsep_int *newton_begins(hsep_newton *self) { return hsep_part(self, self->begins); }
 
-/* A spline with this distance of knots, (preview,), and it behind G_pb, likewise. */
-static hsep_real *newton_shape(hsep_newton *self, hsep_int level)
+/* A spline with this distance of knots, or it behind G_pb, (preview,), of shapes or passed. */
+static hsep_real *newton_level(hsep_newton *self, hsep_int of, hsep_int level)
 {
-    return hsep_at(self, self->shapes) + level * self->preview;
-}
-
-static hsep_real *newton_passed(hsep_newton *self, hsep_int level)
-{
-    return hsep_at(self, self->passed) + level * self->preview;
+    return hsep_at(self, of) + level * self->preview;
 }
 
 /* Begin the physics model's plan at the remainder of the last one, which was predicted last: W' W, W' error. */
@@ -134,7 +129,7 @@ static void newton_open(hsep_newton *self, const hsep_newton_task *task)
     }
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_int level = hsep_knots_at(&task->planner->knots, i).level, begin = newton_begins(self)[i];
-        v[i] = hsep_dot(newton_passed(self, level), target + begin, self->preview - begin);
+        v[i] = hsep_dot(newton_level(self, self->passed, level), target + begin, self->preview - begin);
     }
     hsep_copy(hsep_planner_quadratic(task->planner), hsep_at(self, self->gram), (hsep_int)hsep_triangle(self->m));
     hsep_planner_complete(task->planner, task->planner->jerk_weight);
@@ -158,7 +153,8 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
     const hsep_int apart = spacing << knot.level, from = newton_begins(self)[first];
     if (first == knot.first) {
         hsep_linearised_begin(
-            linearised, task->model, newton_shape(self, knot.level), newton_passed(self, knot.level), 4 * apart);
+            linearised, task->model, newton_level(self, self->shapes, knot.level),
+            newton_level(self, self->passed, knot.level), 4 * apart);
     }
     for (hsep_int c = 0; c < count; c++) {
         columns[c] = hsep_at(self, self->W) + ((first + c) * self->preview + from + c * apart);
@@ -177,24 +173,16 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
 static void newton_products(hsep_newton *self, hsep_planner *planner)
 {
     const hsep_int m = self->m, preview = self->preview, *begins = newton_begins(self);
-    const hsep_real *W = hsep_at(self, self->W), *target = hsep_at(self, self->target);
-    hsep_real *v = hsep_planner_linear(planner), *P = hsep_planner_quadratic(planner);
+    const hsep_real *W = hsep_at(self, self->W), *target = hsep_at(self, self->target), *rights[4];
+    hsep_real *v = hsep_planner_linear(planner), *P = hsep_planner_quadratic(planner), sums[4];
     for (hsep_int i = 0; i < m; i++) {
-        for (hsep_int j = i; j < m; j += 4) {
-            const hsep_int count = hsep_min(m - j, 4);
-            const hsep_real *rights[4];
-            hsep_real sums[4];
-            hsep_int from = preview; /* where one of both begins, or before that */
+        for (hsep_int j = i, count; j < m; j += count) {
+            const hsep_int from = begins[j] > begins[i] ? begins[j] : begins[i]; /* both have begun */
+            count = newton_together(planner, j);
             for (hsep_int c = 0; c < 4; c++) {
-                const hsep_int column = c < count ? j + c : j;
-                from = hsep_min(from, begins[column]);
-                rights[c] = W + column * preview;
+                rights[c] = W + ((c < count ? j + c : j) * preview + from);
             }
-            from = from > begins[i] ? from : begins[i];
-            for (hsep_int c = 0; c < 4; c++) {
-                rights[c] += from;
-            }
-            hsep_dot_four(W + i * preview + from, rights, preview - from, sums);
+            hsep_dot_four(W + (i * preview + from), rights, preview - from, sums);
             hsep_copy(P, sums, count);
             P += count;
         }
@@ -221,7 +209,8 @@ HSEP_API void hsep_newton_init(
     for (hsep_int i = 0; i < self->m; i++) { /* splines of each distance of knots, and W with the physics model alone */
         const hsep_knot knot = hsep_knots_at(&plans->knots, i);
         const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
-        hsep_real *shape = newton_shape(self, knot.level), *passed = newton_passed(self, knot.level);
+        hsep_real *shape = newton_level(self, self->shapes, knot.level),
+                  *passed = newton_level(self, self->passed, knot.level);
         newton_begins(self)[i] = begin;
         hsep_zero(shape, preview);
         hsep_zero(passed, preview);

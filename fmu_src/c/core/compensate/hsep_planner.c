@@ -239,21 +239,6 @@ HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
     }
 }
 
-/* Begin a bounded plan at this cost, from the remainder of the last plan. cost: as hsep_interior_begin has it. */
-static void planner_bound(hsep_planner *self, hsep_real cost, hsep_int steps)
-{
-    hsep_tolerance tolerance = planner_tolerance(self->averaging);
-    const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_problem problem = planner_problem(self);
-    for (hsep_int r = 0; r < HSEP_ORDERS * splines->preview; r++) {
-        problem.low[r] = hsep_at(self, self->low)[r] + tolerance.margin;
-        problem.high[r] = hsep_at(self, self->high)[r] - tolerance.margin;
-    }
-    tolerance.steps = steps;
-    hsep_interior_begin(
-        hsep_part(self, self->interior), splines, &self->solved, hsep_planner_quadratic(self), cost, &tolerance);
-}
-
 /* Change the remainder of the last plan by a step x, (m,), m, of this cost. */
 static void planner_take(hsep_planner *self, const hsep_real x[])
 {
@@ -265,6 +250,7 @@ static void planner_take(hsep_planner *self, const hsep_real x[])
 HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
 {
     const hsep_int n = self->solved.m;
+    const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_problem problem = planner_problem(self);
     hsep_real *free_minimum = problem.x, cost = 0.0, finite = 0.0;
     hsep_copy(problem.factor, hsep_planner_quadratic(self), (hsep_int)hsep_triangle(n));
@@ -281,13 +267,20 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
         return HSEP_PLAN_FAILED;
     }
     planner_rows(self, free_minimum, problem.low);
-    hsep_zero(problem.high, HSEP_ORDERS * hsep_planner_splines(self)->preview);
+    hsep_zero(problem.high, HSEP_ORDERS * splines->preview);
     if (planner_share(self, problem.high, problem.low) == 1.0) {
         planner_take(self, free_minimum);
         return HSEP_PLAN_DONE;
     }
     planner_pin(self);
-    planner_bound(self, cost, steps);
+    hsep_tolerance tolerance = planner_tolerance(self->averaging);
+    tolerance.steps = steps;
+    for (hsep_int r = 0; r < HSEP_ORDERS * splines->preview; r++) {
+        problem.low[r] = hsep_at(self, self->low)[r] + tolerance.margin;
+        problem.high[r] = hsep_at(self, self->high)[r] - tolerance.margin;
+    }
+    hsep_interior_begin(
+        hsep_part(self, self->interior), splines, &self->solved, hsep_planner_quadratic(self), cost, &tolerance);
     return HSEP_PLAN_BOUNDED;
 }
 

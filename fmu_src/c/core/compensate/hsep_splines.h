@@ -167,17 +167,12 @@ static inline void hsep_splines_exceeded(
     }
     for (unsigned order = 1; order < HSEP_ORDERS; order++) {
         hsep_real *row = rows + order * count;
-        hsep_int done = 0;
-        for (hsep_int k = 0; k < count; k++) {
-            if (hsep_fabs(row[k]) > HSEP_LIMITS_EXCEEDED) {
-                for (; done + near < k; done++) {
-                    row[done] = 0.0;
-                }
-                done = k + near + 1;
+        hsep_int end = 0; /* of those that exceed it so far */
+        for (hsep_int k = 0; k < count + near; k++) {
+            end = k < count && hsep_fabs(row[k]) > HSEP_LIMITS_EXCEEDED ? k + 1 : end;
+            if (k >= near && (end == 0 || end + 2 * near <= k)) {
+                row[k - near] = 0.0;
             }
-        }
-        for (; done < count; done++) {
-            row[done] = 0.0;
         }
     }
 }
