@@ -234,9 +234,8 @@ static hsep_real newton_next_reach(hsep_newton *self, const hsep_newton_task *ta
     const hsep_real scale = task->model->forecast_scale * hsep_averaged_disturbances(task->model)->T_s;
     const hsep_int n = HSEP_N_DECIDED + self->n;
     hsep_real *change = hsep_at(self, self->target), last = 0.0, squares = 0.0;
-    for (hsep_int i = 0; i < n; i++) {
-        change[i] = c[i] - best[i];
-    }
+    newton_copy(self, change, c);
+    hsep_axpy(change, -1.0, best, n);
     for (hsep_int k = 0; k < self->preview; k++) {
         const hsep_real delta = hsep_splines_sum(hsep_planner_splines(task->planner), change, n, k);
         squares += (delta - last) * (delta - last);
@@ -279,25 +278,20 @@ static void newton_shift(hsep_newton *self, hsep_int kept)
 static void newton_take(hsep_newton *self, const hsep_planner *planner)
 {
     const hsep_int window = self->Np / hsep_planner_splines(planner)->spacing, first = planner->n_pinned;
-    const hsep_int end = hsep_min(HSEP_PLANNING_NEAR * window, self->n);
+    const hsep_int count = hsep_min(HSEP_PLANNING_NEAR * window, self->n) - first;
     hsep_real *best = hsep_at(self, self->best) + HSEP_N_DECIDED, *corrected = hsep_at(self, self->corrected);
     const hsep_real *rest = hsep_at(self, self->rest) + HSEP_N_DECIDED;
-    hsep_real product = 0.0, now = 0.0, before = 0.0;
-    for (hsep_int i = first; i < end; i++) {
-        const hsep_real change = best[i] - rest[i];
-        product += change * corrected[i];
-        now += change * change;
-        before += corrected[i] * corrected[i];
-    }
-    const hsep_real size = hsep_sqrt(now) * hsep_sqrt(before);
-    const hsep_real cosine = size > 0.0 ? product / size : 0.0;
+    const hsep_real *before = corrected + first, *now = best + first;
+    hsep_axpy(best, -1.0, rest, self->n); /* the change */
+    const hsep_real size = hsep_sqrt(hsep_dot(now, now, count)) * hsep_sqrt(hsep_dot(before, before, count));
+    const hsep_real cosine = size > 0.0 ? hsep_dot(now, before, count) / size : 0.0;
     self->share = hsep_fmax(self->share * (1.0 + HSEP_PLANNING_TAKEN_BACK * cosine), HSEP_PLANNING_LEAST_SHARE);
     self->share = hsep_fmin(self->share, 1.0);
     const hsep_real gain = self->cost_of_rest - self->cost;
     const hsep_real left = gain > 0.0 ? 1.0 / (1.0 + HSEP_PLANNING_DOUBT * self->doubt / gain) : 0.0;
     const hsep_real share = left > 0.0 ? self->share * left : 0.0; /* not NaN */
     for (hsep_int i = 0; i < self->n; i++) {
-        corrected[i] = share * (best[i] - rest[i]);
+        corrected[i] = share * best[i];
         best[i] = rest[i] + corrected[i];
     }
 }
