@@ -84,7 +84,7 @@ class ReadingOptions:
     x_d: Annotated[str | None, typer.Option("--x_d", help="Name of the commanded position's column.")] = None
     x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None
     error: Annotated[
-        str | None, typer.Option("--error", help="Column of commanded − measured, beside one; -NAME: the other way.")
+        str | None, typer.Option("--error", help="Column of the error, commanded − measured; -NAME: the other way.")
     ] = None
     delay: Annotated[
         int, typer.Option(help="Samples by which the log has the measured position too late (negative: too early).")

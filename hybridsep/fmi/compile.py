@@ -186,9 +186,7 @@ def library_paths(
         finally:  # after a failure or Ctrl-C no other one begins
             pool.shutdown(cancel_futures=True)
     if running:
-        versions = sorted(_cache().iterdir(), key=lambda folder: folder.stat().st_mtime, reverse=True)
-        for old in versions[4:]:  # a few branches of a checkout keep theirs, at 8 MB each
-            shutil.rmtree(old, ignore_errors=True)
+        _forget_old_versions()
     return places
 
 
@@ -265,3 +263,9 @@ def _cache() -> Path:
         return root / "build" / "binaries"
     user = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(user) / "hybridsep" / "binaries"
+
+
+def _forget_old_versions() -> None:
+    versions = sorted(_cache().iterdir(), key=lambda folder: folder.stat().st_mtime, reverse=True)
+    for folder in versions[4:]:  # a few branches of a checkout keep theirs, at 8 MB each
+        shutil.rmtree(folder, ignore_errors=True)

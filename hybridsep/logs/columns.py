@@ -82,10 +82,8 @@ def choose_columns(
         found[role] = _time(source, name) if role == "t" else _position(source, name, unit, sign * (role == told))
     x_d, x = found["x_d"], found["x"]
     if x_d.unit.si != x.unit.si:
-        raise LogError(
-            f"{source.path}: column {brief(x_d.name)} is in {x_d.unit.name} and column {brief(x.name)} in "
-            f"{x.unit.name}; both must be lengths or both angles"
-        )
+        units = f"{brief(x_d.name)} is in {x_d.unit.name} and column {brief(x.name)} in {x.unit.name}"
+        raise LogError(f"{source.path}: column {units}; both must be lengths or both angles")
     return found
 
 

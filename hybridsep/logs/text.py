@@ -189,11 +189,8 @@ class TextSource(Source):
         notes = []
         if self._left_out:
             number, text = self._left_out[0]
-            n = len(self._left_out)
-            notes.append(
-                f"{n} line{'s' if n > 1 else ''} without numbers among the rows left out, line {number} first: "
-                f"{brief(text.strip())}"
-            )
+            n, first = len(self._left_out), f"line {number} first: {brief(text.strip())}"
+            notes.append(f"{n} line{'s' if n > 1 else ''} without numbers among the rows left out, {first}")
         if self._held:
             notes.append(f"column {brief(self.commanded)} is blank in {self._held} rows: read as before, as in a trace")
         return notes

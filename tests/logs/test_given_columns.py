@@ -268,7 +268,7 @@ def test_units_of_names() -> None:
 )
 def test_odd_arguments_are_refused_before_the_log_is_read(known: dict[str, Any], message: str) -> None:
     with pytest.raises(HybridSepError, match=message):
-        hybridsep.fit(None, **known)  # type: ignore[arg-type]
+        hybridsep.fit(None, **known)
 
 
 def test_messages_name_pythons_arguments_too() -> None:
