@@ -61,7 +61,7 @@ def test_a_refusal_names_its_file_and_itself_once(
 
 @pytest.mark.parametrize("scale", [1e3, 6e4])  # refused by the checks, and by the reader
 def test_a_log_without_units_is_refused_with_lines_to_paste(tmp_path: Path, hybridsep: Run, scale: float) -> None:
-    log = write_log(tmp_path / "joint 3.csv", header="t,one,other", scale=scale)
+    log = write_log(tmp_path / "joint 3.csv", header="t,goal,present", scale=scale)
     given = ("fit", log, "--x_d", "goal", "--x", "present")
     err = hybridsep.refused(*given, "--out", tmp_path / "fit")
     lines = [line.strip() for line in err.splitlines() if line.startswith("  hybridsep ")]
