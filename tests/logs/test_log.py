@@ -107,6 +107,8 @@ def time_at(i: int, value: float) -> Array:
         (1e6 + np.arange(50, dtype=np.float32) / 16, r"time 't' is rounded too coarsely, 0 % .*, about 0\.062 s"),
         (np.arange(50) * 4.0, r"has an interval of 4, no axis's in s, or a time in ms; give T_s"),
         (1.7e12 + np.arange(50), r"it is an index, or a time in ms since 1970; give T_s \(--T_s 0.001\), or"),
+        (1.33e17 + 1e4 * np.arange(50), r"in 100 ns; give T_s \(--T_s 0.001\), or name .*, 't \[100 ns\]'$"),
+        (np.arange(50.0) * 7 % 50, "time 't' goes back in 6 rows; sort the rows by it"),
         (46_000 + np.arange(50) / 8_640_000, r"an interval of 1\.15741e-07, .* in d; give T_s \(--T_s 0.01\)$"),
     ],
 )
