@@ -120,7 +120,9 @@ def test_a_late_measurement_is_predicted_as_by_the_library(
 
 
 @on_all((PREDICTOR, STAGE_PREDICTOR), needs="agreement")
-@pytest.mark.parametrize("values", [{}, {"p": 20, "dead_time": 4, "input_hold": 1}, {"averaging": False}], ids=named)
+@pytest.mark.parametrize(
+    "values", [{}, {"p": 20, "dead_time": 4, "input_hold": 1}, {"Np": 9, "p": 9}, {"averaging": False}], ids=named
+)
 def test_a_start_in_motion_is_predicted_as_by_the_library(new_stream: StreamMaker, values: dict[str, Value]) -> None:
     inputs = cut(new_stream.model, int(values.get("Np", 100)), 0)
     assert_agreement(new_stream, inputs, AVERAGING | values)

@@ -18,7 +18,7 @@ _MOVING = 0.05
 """Commanded velocity of the first sample relative to the largest of the window, from which on an axis may have been in
 motion: from rest a jerk-limited command needs time."""
 
-_SAMPLES = 4  # samples for each number of the state that are needed to estimate it
+_SAMPLES = 2  # samples for each number of the state that are needed: with one, noise at rest may be explained as motion
 
 _DAMPING = 1e-3
 """Ridge penalty on the change of the state, relative to a response of unit gain: modes that decay at once are not

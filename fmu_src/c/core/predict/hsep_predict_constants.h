@@ -41,7 +41,7 @@
 
 /* hybridsep/predict/averaging/start.py */
 #define HSEP_START_MOVING 0.05
-#define HSEP_START_SAMPLES 4
+#define HSEP_START_SAMPLES 2
 #define HSEP_START_DAMPING 0.001
 
 /* hybridsep/predict/averaging/stacking.py */
