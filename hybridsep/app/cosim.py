@@ -88,12 +88,10 @@ def cosim(
     values = {} if compensate is None else {"compensate": PARAMETERS["compensate"].to_fmi(compensate)}
     limits, costs = None, None
     with tempfile.TemporaryDirectory() as folder, progress_bar(as_json) as advance:
-        controller = predictor or build_here(axis, model, Path(folder), weights=weights)
-        drive = plant or build_here(axis, "FeedDrive", Path(folder))
+        controller = predictor or build_here(axis, model, Path(folder), weights=weights, reference=False)
+        drive = plant or build_here(axis, "FeedDrive", Path(folder), reference=False)
         run = cosimulate(
-            *(controller, drive, command),
-            controller_values=values,
-            progress=lambda k, n: advance("co-simulation", k / n),
+            controller, drive, command, controller_values=values, progress=lambda k, n: advance("co-simulation", k / n)
         )
         if predictor is None and compensate not in (None, "off"):
             settings = replace(axis.compensator_settings, compensate=compensate)
@@ -164,8 +162,8 @@ def _two_axes(
 
         for name, axis, command in zip("XY", machines, meant.axes, strict=True):
             folder = Path(temporary, name)
-            plant = build_here(axis, "FeedDrive", folder)
-            runs.append(compensate(axis, plant, command, folder, f"{name} axis", say)[0])
+            plant = build_here(axis, "FeedDrive", folder, reference=False)
+            runs.append(compensate(axis, plant, command, folder, f"{name} axis", say, reference=False)[0])
     x, y = runs
     contours = contours_of(x, y, meant)
     title = f"{path.name}: {machines[0].title}; {machines[1].title}"

@@ -21,12 +21,18 @@ COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hyb
 RIVAL = "fir_inverse"  # key of :class:`~hybridsep.cosim.inverse.FirInverse`, fitted to the first run of ``off``
 
 Runs = dict[str, Run]
-
 Advance = Callable[[str], object]  # called with the name of each run before it
 
 
 def compensate(
-    machine: Machine, plant: Path, command: Array, out: Path, label: str, advance: Advance, seeds: Sequence[int] = ()
+    machine: Machine,
+    plant: Path,
+    command: Array,
+    out: Path,
+    label: str,
+    advance: Advance,
+    seeds: Sequence[int] = (),
+    reference: bool = True,
 ) -> tuple[Runs, dict[str, Any]]:
     """Run a machine's compensator FMU against a plant FMU: none, physics, hybrid cold and warm.
 
@@ -39,12 +45,11 @@ def compensate(
     assert machine.plant is not None
     seeds = seeds or [machine.plant.seed]
     weights = out / f"{machine.name}.state"
-    cold = build_here(machine, "SepCompensator", out / "fmus")
+    cold = build_here(machine, "SepCompensator", out / "fmus", reference=reference)
     advance(f"{label}, a run to learn from")
     train(machine, command, weights)
-    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", weights=weights)
-    runs: Runs = {}
-    summary: dict[str, Any] = {}
+    warm = build_here(machine, "SepCompensator", out / "fmus" / "warm", weights=weights, reference=reference)
+    runs, summary = Runs(), dict[str, Any]()
 
     def run(key: str, controller: Path | PlayedCommand, values: dict[str, Any] | None = None) -> None:
         advance(f"{label}, {key.replace('_', ' ')}")
@@ -58,8 +63,7 @@ def compensate(
     for key, choice in COMPENSATED.items():
         values = {"compensate": PARAMETERS["compensate"].to_fmi(choice)}
         run(key, warm if key == "hybrid_warm" else cold, values)
-    off = runs["off"]
-    rival = FirInverse.fitted([(off.x_d, off.x_meas)], machine.compensator_predictor.Np)
+    rival = FirInverse.fitted([(runs["off"].x_d, runs["off"].x_meas)], machine.compensator_predictor.Np)
     if rival is not None:
         run(RIVAL, PlayedCommand(rival.command(command), machine.T_s))
     return runs, summary
@@ -77,6 +81,5 @@ def train(machine: Machine, command: Array, path: Path) -> None:
 def mean_summary(summaries: list[dict[str, float | int]], *, spread: str) -> dict[str, Any]:
     """Return the mean of each figure over several runs, and the standard deviation of one of them."""
     mean: dict[str, Any] = {key: float(np.mean([s[key] for s in summaries])) for key in summaries[0]}
-    mean["n_samples"] = summaries[0]["n_samples"]
-    mean[f"{spread}_std"] = float(np.std([s[spread] for s in summaries]))
-    return mean
+    std = float(np.std([s[spread] for s in summaries]))
+    return mean | {"n_samples": summaries[0]["n_samples"], f"{spread}_std": std}

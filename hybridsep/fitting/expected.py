@@ -21,10 +21,8 @@ from ..base.signals import Array
 from ..base.threads import one_blas_thread
 from ..compensate.compensator import SepCompensator
 from ..cosim.loop import FmuController, LibraryController
-from ..fmi.archive import archived
+from ..fmi.archive import build_here
 from ..fmi.compile import host_target, kept
-from ..fmi.native import files
-from ..fmi.spec import FmuSpec
 from ..machines.machine import Machine
 from ..predict.predictor import HybridPredictor
 
@@ -70,10 +68,8 @@ class Trial:
             fmu = None
             with suppress(FmuError, OSError):  # the disk's, too
                 if kept(("SepCompensator", host_target())) is not None:
-                    built = Path(folder) / "tried.fmu"
-                    built.write_bytes(archived(files(FmuSpec.of(machine, "SepCompensator"), reference=False)))
-                    with FmuController(built, {}):
-                        fmu = built
+                    with FmuController(one := build_here(machine, "SepCompensator", Path(folder), reference=False), {}):
+                        fmu = one
             yield cls(machine, fmu)
 
     @one_blas_thread

@@ -13,7 +13,7 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from ..base.errors import FmuError, check_kind
-from ..base.files import as_path, atomic_open
+from ..base.files import as_path, atomic_open, write_whole
 from ..machines.machine import Machine
 from . import native, python
 from .compile import ALL_TARGETS, default_targets, expanded
@@ -111,9 +111,12 @@ def archived(files: Mapping[str, bytes]) -> bytes:
     return file.getvalue()
 
 
-def build_here(machine: Machine, model: str, out: Path, *, weights: Path | None = None) -> Path:
-    """Build a machine's native FMU of a model (``HybridPredictor``, ``FeedDrive``, …); as :func:`build_fmu`."""
-    return build_fmu(machine, fmu_name(model, machine.name), out, weights=weights)
+def build_here(machine: Machine, model: str, out: Path, *, weights: Path | None = None, reference: bool = True) -> Path:
+    """Build a machine's native FMU of a model (``FeedDrive``, …), without a ``reference`` to be run here alone."""
+    path = out / f"{fmu_name(model, machine.name)}.fmu"
+    spec = FmuSpec.of(machine, model, weights=saved_weights(weights, machine, model))
+    write_whole(path, archived(native.files(spec, reference=reference)))
+    return path
 
 
 def other_platforms(fmu: Path, machine: Path, weights: Path | None = None) -> tuple[str, ...]:
