@@ -74,10 +74,9 @@ def test_a_full_standard_output(tmp_path: Path, argument: str) -> None:
 @pytest.mark.slow
 @POSIX
 def test_a_reader_that_has_gone(tmp_path: Path) -> None:
-    log = write_log(tmp_path / "log.csv", n=300)
     read, written = os.pipe()
     os.close(read)
-    done = command("backtest", log, "-m", MACHINE, capture_output=False, stdout=written, stderr=subprocess.PIPE)
+    done = command("example-log", capture_output=False, stdout=written, stderr=subprocess.PIPE, cwd=tmp_path)
     os.close(written)
     assert done.returncode == 1
     assert b"error" not in done.stderr

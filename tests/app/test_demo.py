@@ -122,7 +122,7 @@ def test_the_pictures_of_the_pages_show_these_figures(shown: Demonstration) -> N
 @pytest.mark.slow
 def test_the_spirals_case_draws_both_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first 0.3 s; all of it at night."""
-    monkeypatch.setattr(cases, "spiral", lambda: [axis[:300] for axis in spiral()])
+    monkeypatch.setattr(cases, "spiral", lambda: [axis[:200] for axis in spiral()])
     said: list[str] = []
     summary = cases.spiral_case(tmp_path, said.append)
     assert list(summary) == ["spiral_x", "spiral_y"]

@@ -121,9 +121,9 @@ def test_the_compensator_is_built_and_its_effect_estimated(hybridsep: Run, tmp_p
 
 @pytest.mark.slow
 def test_steps_of_a_command_are_no_rounding() -> None:
-    x_d = np.repeat([0.0, 1e-3, 2e-3, 1e-3], 200)
+    x_d = np.repeat([0.0, 1e-3, 2e-3, 1e-3], 75)
     machine = axis({"velocity": 0.3, "acceleration": 30.0, "jerk": 2e4})
-    assert expected_tracking(machine, [Recording(x_d, simulate(stage(), x_d, T_S), 400)], lambda _: 0).rounding == 0.0
+    assert expected_tracking(machine, [Recording(x_d, simulate(stage(), x_d, T_S), 150)], lambda _: 0).rounding == 0.0
 
 
 @pytest.mark.slow

@@ -49,8 +49,8 @@ def test_trouble_never_makes_it_worse_than_physics(trouble: str) -> None:
 
     troubles: dict[str, dict[str, Any]] = {
         "changed": {"disturb": change},
-        "noise": {"noise": 5e-5, "n": 3000},
-        "limits": {"n": 3000},
+        "noise": {"noise": 5e-5, "n": 2000},
+        "limits": {"n": 2000},
     }
     more = troubles[trouble]
     settings_: dict[str, Any] = {} if trouble == "noise" else asdict(RECOMMENDED)
@@ -68,8 +68,8 @@ def test_a_dead_time_that_is_too_long_is_learned(monkeypatch: pytest.MonkeyPatch
     """Where the command acts 12 samples before the physics model says so: 2.6 µm instead of 227 with its plans."""
     monkeypatch.setattr("compensator_cases.MODEL", ModalModel(MODEL.modes, dead_time=12))
     sep = compensator(averaging=True, Np=20, p=20)
-    closed(sep, n=3000)
-    assert closed(sep, 1, n=1500).tracking_rms < 5e-6
+    closed(sep, n=1500)
+    assert closed(sep, 1, n=1100).tracking_rms < 5e-6
 
 
 def test_only_what_is_tunable_changes_in_a_run() -> None:

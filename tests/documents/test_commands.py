@@ -24,10 +24,10 @@ ELSEWHERE = ("python3 -m venv", "sphinx-build ", "hybridsep fit my_axis.csv --Np
 """Begin of lines that others run: CI, ``test_demo``, ``test_site``, ``test_fit_compensation``."""
 FIT = "hybridsep fit my_axis.csv --Np 100"
 LOG = "hybridsep example-log --out my_axis.csv"
-ROWS = 2001
+ROWS = 1601
 """Lines of the example log that are left once it is written, and at night once it is fitted: of the others it is tested
 that they work."""
-MOVES = 3000  # samples of the staircase that blocks of Python run by day
+MOVES = 1500  # samples of the staircase that blocks of Python run by day
 MADE = {"README.md": "my_axis/report.html", "read-the-report.md": "replay.html", "close-the-loop.md": "compensated.png"}
 """Files that pages leave."""
 

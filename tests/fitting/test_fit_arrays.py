@@ -5,9 +5,9 @@ from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from command_line import write_rows
 from quick_fits import without_larger_structures, without_other_settings
@@ -23,17 +23,6 @@ PART = np.r_[:600, 999:1599]  # moves in each half, between them at rest
 X_D, X = commanded()[PART], measured(0)[PART]
 
 
-class Frame:
-    """Table as pandas has it."""
-
-    def __init__(self, **columns: Any) -> None:
-        self._columns = columns
-        self.columns = list(columns)
-
-    def __getitem__(self, name: str) -> Any:
-        return self._columns[name]
-
-
 @pytest.fixture(scope="module")
 def axis() -> Fit:
     with pytest.MonkeyPatch.context() as patch:
@@ -45,7 +34,8 @@ def axis() -> Fit:
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick_fit")
 def test_arrays_a_table_and_a_file_are_one_log(axis: Fit, tmp_path: Path) -> None:
-    table = Frame(time=np.datetime64("2026-03-05") + np.arange(N).astype("m8[ms]"), goal=1e3 * X_D, present=1e3 * X)
+    time = np.datetime64("2026-03-05T10:00") + np.arange(N).astype("m8[ms]")
+    table = pa.table({"time": time, "goal": 1e3 * X_D, "present": 1e3 * X})
     of_table = hybridsep.read_log(table, columns={"x_d": "goal", "x": "present"}, unit="mm")
     [of_arrays] = axis.logs
     of_file = hybridsep.read_log(write_rows(tmp_path / "axis.csv", 1e3 * X_D, 1e3 * X), unit="mm")

@@ -83,23 +83,6 @@ def test_columns_in_a_struct_are_guessed_beside_those_that_are_named(tmp_path: P
         assert {"x_d": "trace.pos.act_mm", "x": "trace.pos.set_mm"}[role] in named.columns.values()
 
 
-def test_a_german_log(tmp_path: Path) -> None:
-    log = read_log(write_csv(tmp_path / "log.csv", "Zeit [ms];Solllage [mm];Istlage [mm]\n0;1,5;1\n2;2;1,5\n"))
-    np.testing.assert_allclose((*log.t, *log.x_d, *log.x_meas), (0, 2e-3, 1.5e-3, 2e-3, 1e-3, 1.5e-3))
-
-
-@pytest.mark.parametrize("names", ["time_ms,pos_sp_inch,pos_pv_inch", "epoch_ms,q_des_inch,q_inch"])
-def test_words_of_process_control_a_bare_axis_and_units_in_words(tmp_path: Path, names: str) -> None:
-    log = read_log(write_csv(tmp_path / "log.csv", f"{names}\n0,1,2\n1,2,3\n"))
-    np.testing.assert_allclose((*log.t, *log.x_d, *log.x_meas), (0, 1e-3, 0.0254, 0.0508, 0.0508, 0.0762))
-
-
-def test_row_labels_are_no_bare_axis(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "log.csv", ",t,target,theta\n0,0,1,2\n1,1,2,3\n")
-    with pytest.raises(LogError, match="columns 'x_d', 'x' are missing"):
-        read_log(path)
-
-
 @pytest.mark.parametrize("unit", ["cm", "0um", "furlong", 1e-3, b"mm", ["mm"]])
 def test_units_that_are_none(tmp_path: Path, unit: Any) -> None:
     path = write(tmp_path / "log.npz", columns())

@@ -56,6 +56,9 @@ TWO_ROWS = "0,1,2\n1,3,4\n"
         "t,x_d,x,x_m\n0,1,2,9\n1,3,4,9\n",
         "Elapsed Time (ms),cycle_time,x_d,x\n0,7,1,2\n1000,7,3,4\n",
         "millis,target_position,current_position\n0,1,2\n1000,3,4\n",
+        "Zeit [ms];Solllage [mm];Istlage [mm]\n0;1000,0;2000\n1000;3000;4000\n",
+        "time_ms,pos_sp_meter,pos_pv_meter\n0,1,2\n1000,3,4\n",
+        "epoch_ms,q_des_inch,q_meter\n0,39.37007874015748,2\n1000,118.11023622047244,4\n",
         # Rows with a key
         "Name;Zeit;Soll;Ist\nEinheit;ms;mm;mm\n;0;1000;2000\n;1000;3000;4000\n",
     ],
@@ -102,6 +105,7 @@ def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
         ),
         ("t,x_d,x\n" + "0,0,\n.5,,0\n" * 9, r"rows have either 'x_d' or 'x': channels with times of their own;"),
         ("t,x_d,x\n0;0;0\n", "line 2: column 't' must be a number, got '0;0;0'"),
+        (",t,target,theta\n0,0,1,2\n1,1,2,3\n", "columns 'x_d', 'x' are missing"),  # row labels are no bare axis
     ],
 )
 def test_refused_texts(tmp_path: Path, text: str, message: str) -> None:

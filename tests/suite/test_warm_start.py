@@ -41,7 +41,7 @@ def led(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @on_adapters(LOOK_AHEADS, needs="agreement")
 def test_a_warm_run_is_the_librarys_second_run(new_stream: StreamMaker) -> None:
     path, model = trained_state(new_stream.model), new_stream.model
-    loop = closed_loop(model, 6001 if model == PREDICTOR else 1001, weights=path)
+    loop = closed_loop(model, 2001 if model == PREDICTOR else 701, weights=path)
     stream = new_stream(weights=path)
     stream.initialise(loop.values)
     np.testing.assert_allclose(replay(stream, loop), loop.outputs, rtol=0, atol=1e-11)

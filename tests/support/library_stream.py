@@ -58,7 +58,7 @@ def trained_state(kind: str) -> Path:
             backtest(predictor, staircase(), encoder.measure_all(x))
         else:
             compensator = machine.new_compensator()
-            cosimulate(compensator, machine.new_plant(), staircase()[:4000], encoder=encoder)
+            cosimulate(compensator, machine.new_plant(), staircase()[:2500], encoder=encoder)
             predictor = compensator.predictor
         predictor.save(path)
 
