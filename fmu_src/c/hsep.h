@@ -164,7 +164,8 @@ HSEP_API int hsep_compensator_change(
 
 /* End a trip where the level of the reset rises; what was learned before stays. It trips where x_meas is farther from
  * x_d, or in the geometric mean from x_d and x_dm, than following_error_max for three samples in a row: from the next
- * window on the change fades, as with compensate off. With averaging nothing that is measured above it, or until the reset, is learned. */
+ * window on the change fades, as with compensate off. With averaging nothing that is measured above it, or until the
+ * reset, is learned. */
 HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level);
 
 /* Set the load that the samples from now on bring, finite, 0 before: force or torque on the axis divided by the
