@@ -180,7 +180,7 @@ class SepCompensator:
         chosen = self._planning.choose(predictor, preview, SepState.OFF if fades else self.compensate)
         coefficients, stop = chosen.coefficients, self._last_stop
         if self._stop is not None:
-            limits = self._planning.bounds.hard(command, x_d_before, delta_before)
+            limits = self._planning.bounds.hard(command, x_d_before, delta_before, turns=len(command))
             coefficients, stop = self._stop.carried_out(coefficients, stop, *limits)
         delta = (self._basis.values @ coefficients)[:Np]
         x_dm = command[:Np] + delta

@@ -92,23 +92,22 @@ class DriveBounds:
         delta_before: Array,
         previous_plan: Array,
         *,
-        may_turn: bool = False,
+        turns: int = 0,
         change: float = 1.0,
     ) -> Bounds:
         """Return the bounds on a change of the remainder of the last plan by free coefficients.
 
         ``x_d``: (preview,), m: commanded positions. Within the length of a spline of where they exceed a limit, it is
-        widened by what they take of it; ``x_d_before``, ``delta_before``: (3,), m: last three commanded positions
-        before the plan, and last three changes of them; ``previous_plan``: (3 + n_free,), m: coefficients of the
-        remainder of the last plan, the decided ones first; ``may_turn``: whether the command may turn where
-        ``no_reversal`` forbids it; ``change``: share of ``change_max`` that bounds ``|δ|``.
+        widened by what they take of it; ``x_d_before``, ``delta_before``: (3,), m: the last three before them, and of
+        their changes; ``previous_plan``: (3 + n_free,), m: coefficients of the last plan's remainder, decided ones
+        first; ``turns``: first samples in which it may turn in spite of ``no_reversal``; ``change``: of ``change_max``.
         """
-        low, high = self.hard(x_d, x_d_before, delta_before, may_turn=may_turn, change=change)
+        low, high = self.hard(x_d, x_d_before, delta_before, turns=turns, change=change)
         taken = self._all @ previous_plan
         return Bounds(self._free, np.minimum(low - taken, -_INTERIOR), np.maximum(high - taken, _INTERIOR))
 
     def hard(
-        self, x_d: Array, x_d_before: Array, delta_before: Array, *, may_turn: bool = True, change: float = 1.0
+        self, x_d: Array, x_d_before: Array, delta_before: Array, *, turns: int = 0, change: float = 1.0
     ) -> tuple[Array, Array]:
         """Return the least and the largest rows of a change within the limits, the decided coefficients' included."""
         past = np.concatenate((delta_before, np.zeros(len(x_d))))
@@ -122,10 +121,10 @@ class DriveBounds:
         most = np.repeat([(1.0 - ROUNDING) * (1.0 if order else change) for order, _ in self._scales], len(x_d))
         own = np.concatenate((np.zeros(0), *(self._own(x_d, x_d_before, *scale) for scale in self._scales)))
         least, most = np.minimum(own, 0.0) - most, np.maximum(own, 0.0) + most
-        if self._no_reversal and not may_turn:  # the velocity's rows are the first
-            steps = first_differences(x_d, x_d_before[-1])
-            least[: len(x_d)][steps > _MOVES] = 0.0
-            most[: len(x_d)][steps < -_MOVES] = 0.0
+        if self._no_reversal:  # the velocity's rows are the first
+            steps = first_differences(x_d, x_d_before[-1])[turns:]
+            least[turns : len(x_d)][steps > _MOVES] = 0.0
+            most[turns : len(x_d)][steps < -_MOVES] = 0.0
         return least - offset, most - offset
 
     def _own(self, x_d: Array, before: Array, order: int, bound: float) -> Array:

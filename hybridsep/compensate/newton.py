@@ -38,7 +38,6 @@ _OWN_REACH = 1e-3
 """Change of velocity, relative to the velocity scale, that slopes of the user's own disturbances are taken over where
 the friction's is the tangent."""
 
-
 _APART = 4  # samples after the window that share the variance of the first one's features
 
 

@@ -167,10 +167,10 @@ class Planning(ABC):
         found = solve_change(cost, self.limits(preview), last, not_pinned, 0, self.SOLVED)
         return last if found is None else found
 
-    def limits(self, preview: Preview, *, may_turn: bool = False, change: float = 1.0) -> Bounds:
+    def limits(self, preview: Preview, *, turns: int = 0, change: float = 1.0) -> Bounds:
         """Return the drive's limits on the coefficients of a plan, and a share of the largest change."""
         before = preview.x_d_before, preview.delta_before, preview.previous_plan
-        return self.bounds.bounds(preview.command, *before, may_turn=may_turn, change=change)
+        return self.bounds.bounds(preview.command, *before, turns=turns, change=change)
 
 
 _PINNED_PAPER = 8
@@ -246,6 +246,8 @@ _DOUBT = 0.1
 of the variances of what is predicted over the plan, weighted as its errors. At rest, before sliding, a model from
 motion predicts errors as small as its noise, and moved the drive for them."""
 
+_STRAIGHT = 20  # parts of a plan of few windows, in the last of which its way back to the path may not turn friction
+
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's
 model."""
@@ -262,6 +264,7 @@ class AveragedPlanning(Planning):
         self.weight = basis.weight
         few = self.n_pinned * self.spacing < TWICE
         self.n_steps = 1 if few else 2 if THRICE * Np <= self.horizon else 3
+        self.n_turning = self.horizon - (self.horizon // _STRAIGHT if self.n_steps > 2 else 0)
         # A plan that has faded as it had no stop may exceed limits where wide splines cannot leave it
         n = basis.n_free - self.n_pinned
         free = solved_splines(n, Np // self.spacing if self.horizon == settings.preview else n)
@@ -292,7 +295,7 @@ class AveragedPlanning(Planning):
         follows = has_learned and most is SepState.HYBRID
         tolerance = TOLERANCE._replace(steps=PHYSICS_STEPS) if follows else TOLERANCE
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
-        bounds = self.limits(preview, may_turn=most is SepState.PHYSICS, change=of_physics_change)
+        bounds = self.limits(preview, turns=self.horizon if most is SepState.PHYSICS else 0, change=of_physics_change)
         physics = self.affine_plan(g, free, path, preview, bounds, tolerance=tolerance)
         if has_learned:
             end = len(self.ahead) * self.Np
@@ -310,7 +313,7 @@ class AveragedPlanning(Planning):
                 hybrid, reach, steps = last, self.reach, self.n_steps
                 while steps > 0:
                     start, before = hybrid, replace(preview, previous_plan=hybrid.coefficients)
-                    bounds = self.limits(before, may_turn=True, change=change)
+                    bounds = self.limits(before, turns=self.n_turning, change=change)
                     hybrid, reach = planner.step(start, bounds, self.basis.filtered(g), reach)
                     steps = steps - 1 if hybrid is not start else 0  # where it gains nothing the next window goes on
                 if is_better(hybrid.cost, of_physics.cost):

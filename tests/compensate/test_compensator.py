@@ -47,12 +47,8 @@ def test_trouble_never_makes_it_worse_than_physics(trouble: str) -> None:
         if k == 3050 and isinstance(drive, FeedDrive):
             drive.k, drive.c_nl, drive.k_nl = 1.1 * drive.k, 2 * drive.c_nl, 2 * drive.k_nl
 
-    troubles: dict[str, dict[str, Any]] = {
-        "changed": {"disturb": change},
-        "noise": {"noise": 5e-5, "n": 2000},
-        "limits": {"n": 2000},
-    }
-    more = troubles[trouble]
+    more: dict[str, Any] = {"disturb": change} if trouble == "changed" else {"n": 2000}
+    more |= {"noise": 5e-5} if trouble == "noise" else {}
     settings_: dict[str, Any] = {} if trouble == "noise" else asdict(RECOMMENDED)
     limits = PAPER_LIMITS if trouble == "limits" else DRIVE_LIMITS
     physics = closed(compensator("physics", limits, **settings_), **more)
@@ -76,9 +72,8 @@ def test_only_what_is_tunable_changes_in_a_run() -> None:
     """How it fades, on every implementation: tests/suite/test_tunable.py."""
     sep = compensator()
     before = sep.to_bytes()
-    with pytest.raises(
-        ParameterError, match="preview, spacing cannot change in a run, change_max, following_error_max, compensate can"
-    ):
+    said = "preview, spacing cannot change in a run, change_max, following_error_max, compensate can"
+    with pytest.raises(ParameterError, match=said):
         sep.change(preview=300, spacing=1, compensate="off")
     with pytest.raises(ParameterError, match="compensate must be one of off, physics, hybrid, got 'none'"):
         sep.change(compensate="none")

@@ -37,14 +37,15 @@ def test_a_command_never_turns_where_the_path_moves(seed: int, spread: float, li
 
 
 @pytest.mark.slow
-def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction() -> None:
+@pytest.mark.parametrize("turns", [0, 70])
+def test_only_the_velocity_where_the_path_moves_is_bounded_by_the_direction(turns: int) -> None:
     basis, n, step = SplineBasis(80, 4, 80), 80, 1e-5
     steps = np.concatenate((np.full(30, step), np.zeros(30), np.full(20, -step)))  # it moves from the first sample on
     x_d, before, rest = 0.01 + np.cumsum(steps), np.full(3, 0.01), np.zeros(basis.values.shape[1])
     both = (DriveBounds(basis, TS, DRIVE_LIMITS, 1e-3, no_reversal=keep) for keep in (False, True))
-    free, kept = (one.bounds(x_d, before, np.zeros(3), rest) for one in both)
+    free, kept = (one.bounds(x_d, before, np.zeros(3), rest, turns=turns) for one in both)
     forward, backward = np.zeros(4 * n, dtype=np.bool_), np.zeros(4 * n, dtype=np.bool_)
-    forward[:30], backward[60:80] = True, True
+    forward[turns:30], backward[max(turns, 60) : 80] = True, True
     speed = step / (DRIVE_LIMITS.velocity * TS)  # share of the limit that the path takes
     np.testing.assert_allclose(kept.low[forward], -speed, rtol=1e-9)
     np.testing.assert_allclose(kept.high[backward], speed, rtol=1e-9)

@@ -123,7 +123,7 @@ static void newton_open(hsep_newton *self, const hsep_newton_task *task)
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *weight = hsep_at(self, self->weight);
     hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
     const hsep_real change = hsep_averaged_doubts(task->model) ? 1.0 : self->bound;
-    hsep_planner_open(task->planner, task->x_d, self->is_physics > 0, change);
+    hsep_planner_open(task->planner, task->x_d, self->is_physics ? self->preview : 0, change);
     for (hsep_int k = 0; k < self->preview; k++) {
         target[k] = weight[k] * weight[k] * (task->x_d[k] - task->predictor->start - x_pb[self->preview - 1 - k]);
     }
@@ -425,6 +425,7 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
 static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_int all = self->late + self->preview;
+    const hsep_int straight = self->n_steps > 2 ? self->preview / HSEP_PLANNING_STRAIGHT : 0;
     hsep_planner *planner = task->planner;
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
     hsep_real *of_physics = hsep_at(self, self->of_physics);
@@ -467,7 +468,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         for (self->steps = 0; self->follows && self->gains && self->steps < self->n_steps; self->steps++) {
             NEWTON_YIELD(10, NEWTON_SOME);
             newton_copy(self, c, hsep_at(self, self->best));
-            hsep_planner_open(planner, task->x_d, 1, self->bound); /* the model follows the friction */
+            hsep_planner_open(planner, task->x_d, self->preview - straight, self->bound); /* it follows the friction */
             NEWTON_YIELD(11, NEWTON_PREDICTION);
             (void)newton_errors(self, task);
             hsep_linearised_at(

@@ -46,6 +46,7 @@
 #define HSEP_PLANNING_LEAST_SHARE 0.7
 #define HSEP_PLANNING_NEAR 4
 #define HSEP_PLANNING_DOUBT 0.1
+#define HSEP_PLANNING_STRAIGHT 20
 #define HSEP_PLANNING_PINNED_AVERAGED 24
 
 /* hybridsep/compensate/stop.py */

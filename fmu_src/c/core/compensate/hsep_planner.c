@@ -83,7 +83,7 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_predictor_paramet
  * shares: the limits, with a share of change_max, without what x_d and these coefficients take of them. Where x_d itself
  * exceeds one within the length of a spline, as a command that is held or rounded does, the limit is wider by that. */
 static void planner_limits(
-    const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int preview, int may_turn,
+    const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int preview, hsep_int turns,
     hsep_real change_max, hsep_real low[], hsep_real high[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
@@ -99,7 +99,7 @@ static void planner_limits(
             const hsep_int r = order * preview + k;
             const hsep_real taken = ((order > 0 ? path[order] : 0.0) + change[order]) * splines->share[order];
             const hsep_real exceeded = high[r], room = (1.0 - HSEP_LIMITS_ROUNDING) * (order > 0 ? 1.0 : change_max);
-            const int keeps = order == 1 && !may_turn; /* the direction of x_d */
+            const int keeps = order == 1 && k >= turns; /* the direction of x_d */
             const hsep_real least = keeps && path[1] > HSEP_LIMITS_MOVES ? 0.0 : hsep_fmin(exceeded, 0.0) - room;
             const hsep_real most = keeps && path[1] < -HSEP_LIMITS_MOVES ? 0.0 : hsep_fmax(exceeded, 0.0) + room;
             low[r] = least - taken;
@@ -122,13 +122,13 @@ static hsep_real planner_third(const hsep_planner *self, const hsep_real c[], hs
     return squares;
 }
 
-HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], int may_turn, hsep_real change)
+HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], hsep_int turns, hsep_real change)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_int count = HSEP_N_DECIDED + splines->n;
     hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
     self->solved = self->knots;
-    planner_limits(self, x_d, count, splines->preview, may_turn || !self->no_reversal, change, low, high);
+    planner_limits(self, x_d, count, splines->preview, self->no_reversal ? turns : splines->preview, change, low, high);
     (void)planner_third(self, hsep_at(self, self->c), count, hsep_at(self, self->third));
     /* No change is always feasible, with a small margin: an interior-point method needs an interior */
     for (hsep_int r = 0; r < HSEP_ORDERS * splines->preview; r++) {
@@ -314,7 +314,7 @@ HSEP_API void hsep_planner_carry_out(hsep_planner *self, const hsep_real x_d[])
     if (self->stop > 0) {
         hsep_stop *stop = hsep_part(self, self->stop);
         hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
-        planner_limits(self, x_d, 0, stop->preview, 1, 1.0, low, high);
+        planner_limits(self, x_d, 0, stop->preview, stop->preview, 1.0, low, high);
         hsep_stop_carry_out(stop, hsep_planner_splines(self), low, high, hsep_at(self, self->c));
     }
 }
