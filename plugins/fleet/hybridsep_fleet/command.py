@@ -41,6 +41,9 @@ def fleet(
     t: Annotated[str | None, typer.Option("--t", help="Name of the time column.")] = None,
     x_d: Annotated[str | None, typer.Option("--x_d", help="Name of the commanded position's column.")] = None,
     x: Annotated[str | None, typer.Option("--x", help="Name of the measured position's column.")] = None,
+    error: Annotated[
+        str | None, typer.Option("--error", help="Name of the error, commanded − measured; -NAME: the other way.")
+    ] = None,
     *,
     fmus: Annotated[bool, typer.Option(help="Build the FMUs of what is fitted.")] = True,
     reports: Annotated[bool, typer.Option(help="Write a report of each axis.")] = True,
@@ -73,7 +76,7 @@ def fleet(
         return
     if out is None:
         raise ParameterError("--out must name the folder of the results")
-    columns = tuple((role, column) for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column)
+    columns = tuple((role, one) for role, one in (("t", t), ("x_d", x_d), ("x", x), ("error", error)) if one)
     settings = FleetSettings(
         *(Np, unit, T_s, columns, tuple(axis or ())),
         machines=str(machines.absolute()) if machines else "",

@@ -53,6 +53,9 @@ def live(
     t: Annotated[str | None, typer.Option("--t", help="Name of the time.")] = None,
     x_d: Annotated[str | None, typer.Option("--x_d", help="Name of the commanded position.")] = None,
     x: Annotated[str | None, typer.Option("--x", help="Name of the measured position.")] = None,
+    error: Annotated[
+        str | None, typer.Option("--error", help="Name of the error, commanded − measured; -NAME: the other way.")
+    ] = None,
     *,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, and nothing else.")] = False,
 ) -> None:
@@ -84,7 +87,7 @@ def live(
         if weights is not None:
             raise ParameterError("--weights go into an FMU that is built here; leave out --predictor")
         check_controller(predictor, PREDICTOR)
-    columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x)) if column}
+    columns = {role: column for role, column in (("t", t), ("x_d", x_d), ("x", x), ("error", error)) if column}
     given = Given(columns, unit, T_s, axis, speed)
     run = LiveRun({}, 0)
 

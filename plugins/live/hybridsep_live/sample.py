@@ -30,7 +30,7 @@ class Sample(NamedTuple):
 class Reading(NamedTuple):
     """How the names of a stream are read."""
 
-    columns: Mapping[str, str] = {}  # the stream's names of ``"t"``, ``"x_d"`` and ``"x"``, where they are others
+    columns: Mapping[str, str] = {}  # the stream's names of ``"t"``, ``"x_d"``, ``"x"``, ``"error"``, as of read_log
     unit: str | None = None  # unit of the positions; from the names, or SI, if left out
     si: str = "m"  # {"m", "rad"}: unit of the machine
 
@@ -82,7 +82,9 @@ class _Chosen:
             raise SignalError(f"{where}: {NUMBER} must be a whole number, got {brief(k)}")
         t = None if self.t is None else self.t.unit.factor * _number(values, self.t.name, where)
         x_d = self.x_d.unit.factor * _number(values, self.x_d.name, where)
-        x_meas = self.x.unit.factor * _number(values, self.x.name, where, may_miss=True)
+        x_meas = self.x.unit.factor * _number(values, self.x.name, where, may_miss=not self.x_d.error)
+        x_meas = x_d - self.x.error * x_meas if self.x.error else x_meas  # an error tells one of them
+        x_d = x_meas + self.x_d.error * x_d if self.x_d.error else x_d
         return Sample(x_d, x_meas, None if k is None else int(k), t, self.ahead)
 
 

@@ -223,6 +223,8 @@ def open_source(
     """
     own = machine.log
     columns, unit = {**own.columns, **given.columns}, given.unit or own.unit
+    if "error" in given.columns:  # in the place of a position
+        columns.pop("x_d" if "x" in given.columns else "x", None)
     if given.T_s is not None and "t" not in given.columns:
         columns.pop("t", None)  # there may be none
     T_s = check_reading(unit, given.T_s)

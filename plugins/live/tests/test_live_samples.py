@@ -36,6 +36,15 @@ def test_units_and_names() -> None:
         messages('{"x_d [mm]": 1, "x [mm]": 1}', reading=Reading(si="rad"))
 
 
+def test_an_error_tells_the_other_position() -> None:
+    told = Reading({"error": "err"})
+    assert rows("set [mm],err [um]", "1,250", reading=told) == [Sample(1e-3, pytest.approx(7.5e-4))]  # type: ignore[arg-type]
+    assert rows("act [mm],err [um]", "1,250", reading=told) == [Sample(pytest.approx(1.25e-3), 1e-3)]  # type: ignore[arg-type]
+    assert math.isnan(rows("set [mm],err [um]", "1,", reading=told)[0].x_meas)
+    with pytest.raises(SignalError, match=r"act \[mm\] is missing"):
+        rows("act [mm],err [um]", ",250", reading=told)
+
+
 def test_missing_measurements() -> None:
     first, *others = messages('{"x_d": 0, "x_meas": null}', '{"x_d": 0}', '{"x_d": 0, "x_meas": NaN}')
     assert first.x_d == 0.0
