@@ -40,10 +40,9 @@ typedef struct {
 } hsep_linearised;
 HSEP_ASSERT_WORDS(hsep_linearised, 18);
 
-#define LINEARISED_DIFFERENCES 8 /* most orders of differences of x_pb, it among them */
-#define LINEARISED_GAINS 5       /* of an expert: of v_d now and before, of x now and the two samples before */
-#define LINEARISED_BEFORE 2      /* samples at rest before a change */
-#define LINEARISED_TOGETHER 4    /* samples of a recursion that are summed side by side */
+#define LINEARISED_GAINS 5    /* of an expert: of v_d now and before, of x now and the two samples before */
+#define LINEARISED_BEFORE 2   /* samples at rest before a change */
+#define LINEARISED_TOGETHER 4 /* samples of a recursion that are summed side by side */
 
 /* Weight in the stack of expert i of those that rows train; 0 if it knows nothing, or predicts another residual. */
 static hsep_real linearised_weight(const hsep_averaged *model, hsep_int i, hsep_int kind)
@@ -138,23 +137,6 @@ static void linearised_gains(hsep_linearised *self, const hsep_real weights[], h
         x_before[k] = -(given[0][2] + given[1][2]) - (last[1] + last[2]);
         x_earlier[k] = last[2];
         memcpy(last, given[1], sizeof last);
-    }
-}
-
-/* Response of the features of x_pb, x_pb itself and its differences, to a change behind G_pb. */
-static void linearised_pass(
-    const hsep_real weights[], hsep_int count, const hsep_real passed[], hsep_int n, hsep_real to[])
-{
-    hsep_real d[LINEARISED_DIFFERENCES] = {0.0}; /* of the sample before */
-    for (hsep_int k = 0; k < n; k++) {
-        hsep_real difference = passed[k];
-        to[k] = 0.0;
-        for (hsep_int i = 0; i < count; i++) {
-            const hsep_real before = d[i];
-            to[k] += weights[i] * difference;
-            d[i] = difference;
-            difference -= before;
-        }
     }
 }
 
@@ -254,8 +236,15 @@ static void hsep_linearised_begin(
         if (linearised_weight(model, i, HSEP_MODEL_RESIDUAL) > 0.0) {
             const hsep_int n_passed = first - 1 - HSEP_FEATURES_N_SPANS;
             const hsep_real *weights = hsep_expert_weights(expert) + 1;
-            hsep_real *response = linearised_response(self, i);
-            linearised_pass(weights, n_passed, passed, self->preview, response);
+            hsep_real *response = linearised_response(self, i), *difference = hsep_at(self, self->run);
+            hsep_zero(response, self->preview);
+            hsep_copy(difference, passed, self->preview);
+            for (hsep_int j = 0; j < n_passed; j++) { /* of x_pb itself and its differences */
+                hsep_axpy(response, weights[j], difference, self->preview);
+                for (hsep_int u = self->preview; u-- > 1;) {
+                    difference[u] -= difference[u - 1];
+                }
+            }
             linearised_span(self, weights + n_passed, dead_time, response);
         } else if (weight > 0.0) {
             linearised_of_increments(self, expert, n, dead_time, linearised_response(self, i));

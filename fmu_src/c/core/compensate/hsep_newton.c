@@ -264,15 +264,6 @@ static void newton_judge(hsep_newton *self, const hsep_newton_task *task)
     }
 }
 
-/* Forget what the last plan changed but for what is in its remainder, which this plan may change. */
-static void newton_shift(hsep_newton *self, hsep_int kept)
-{
-    hsep_real *corrected = hsep_at(self, self->corrected);
-    const hsep_int left = self->follows ? self->n - kept : 0;
-    hsep_copy(corrected, corrected + (self->n - left), left);
-    hsep_zero(corrected + left, self->n - left);
-}
-
 /* Take a share of what the best plan changes, smaller where it takes back what the last plan has changed, or gains
  * little beside the variance of its prediction. */
 static void newton_take(hsep_newton *self, const hsep_planner *planner)
@@ -428,7 +419,8 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
     const hsep_int straight = self->n_steps > 2 ? self->preview / HSEP_PLANNING_STRAIGHT : 0;
     hsep_planner *planner = task->planner;
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
-    hsep_real *of_physics = hsep_at(self, self->of_physics);
+    hsep_real *of_physics = hsep_at(self, self->of_physics), *corrected = hsep_at(self, self->corrected);
+    const hsep_int kept = self->Np / hsep_planner_splines(planner)->spacing;
 
     switch (self->place) {
     case 0:
@@ -451,7 +443,9 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         newton_copy(self, of_physics, c);
         self->judges = self->judges && self->planned;
         self->follows = self->follows && self->planned;
-        newton_shift(self, self->Np / hsep_planner_splines(planner)->spacing);
+        /* What the last plan changed, as far as it is in its remainder, which this plan may change */
+        hsep_copy(corrected, corrected + kept, self->n - kept);
+        hsep_zero(self->follows ? corrected + (self->n - kept) : corrected, self->follows ? kept : self->n);
 
         /* In place of the remainder of the last plan one that ends compensation, where it is off */
         self->cost_of_rest = self->cost;

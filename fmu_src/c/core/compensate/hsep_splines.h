@@ -224,13 +224,6 @@ static inline void splines_products(
     to[0] = s0, to[1] = s1, to[2] = s2, to[3] = s3;
 }
 
-/* Set the product of spline i with i + d. */
-static inline void splines_product(hsep_real products[], hsep_int i, hsep_int d, hsep_real value)
-{
-    products[HSEP_KNOTS_WIDTH * i + HSEP_KNOTS_NEAR + d] = value;
-    products[HSEP_KNOTS_WIDTH * (i + d) + HSEP_KNOTS_NEAR - d] = value;
-}
-
 /* The products A' diag(weights) A (hsep_knots_add). work: (4 preview + 4 HSEP_LANES_MOST,), of which the last ones are
  * read beside others. */
 static inline void hsep_splines_gram(
@@ -252,7 +245,8 @@ static inline void hsep_splines_gram(
             if (within == 0) {
                 splines_products(self, work, first + i, d, sums);
             }
-            splines_product(products, i, d, sums[within]);
+            products[HSEP_KNOTS_WIDTH * i + HSEP_KNOTS_NEAR + d] = sums[within];
+            products[HSEP_KNOTS_WIDTH * (i + d) + HSEP_KNOTS_NEAR - d] = sums[within];
         }
     }
 }
