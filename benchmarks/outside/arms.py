@@ -27,7 +27,7 @@ import numpy as np
 from benchmarks.outside.controller import Controller
 from hybridsep.base.metrics import ErrorSize
 from hybridsep.base.signals import Array
-from hybridsep.cosim.inverse import FirInverse
+from hybridsep.cosim.fir_inverse import FirInverse
 from hybridsep.fitting.fit import Fit, fit
 from hybridsep.machines.machine import Machine
 

@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.outside.controller import Controller
 from hybridsep.base.metrics import ErrorSize
 from hybridsep.base.signals import Array
-from hybridsep.cosim.inverse import FirInverse, PlayedCommand
+from hybridsep.cosim.fir_inverse import FirInverse, PlayedCommand
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.fitting.fit import fit
 from hybridsep.machines.machine import Machine

@@ -11,14 +11,14 @@ from ..base.signals import Array
 from ..fmi.archive import build_here
 from ..machines.machine import Machine
 from ..plants.plant import Encoder
-from .inverse import FirInverse, PlayedCommand
+from .fir_inverse import FirInverse, PlayedCommand
 from .loop import cosimulate
 from .run import Run
 
 COMPENSATED = {"off": "off", "physics": "physics", "hybrid_cold": "hybrid", "hybrid_warm": "hybrid"}
 """Compensated runs of a case, by the keys of :data:`hybridsep.evaluate.figures.CASES`: value of ``compensate``."""
 
-RIVAL = "fir_inverse"  # key of :class:`~hybridsep.cosim.inverse.FirInverse`, fitted to the first run of ``off``
+RIVAL = "fir_inverse"  # key of :class:`~hybridsep.cosim.fir_inverse.FirInverse`, fitted to the first run of ``off``
 
 Runs = dict[str, Run]
 Advance = Callable[[str], object]  # called with the name of each run before it

@@ -18,7 +18,7 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array
 from ..base.threads import one_blas_thread
-from .state_space import folded, identified, inputs_of
+from .n4sid import folded, identified, inputs_of
 
 _LATE_MAX, _TIME_CONSTANTS = 21, (0.05, 1e4)
 """Most samples that a command is tried to be late by; least and largest time constant that are tried, samples."""

@@ -12,7 +12,7 @@ from ..base.metrics import ErrorSize, largest, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, CompensatorSettings, Limits
 from ..base.signals import Array
 from ..compensate.planning import FASTER
-from ..cosim.inverse import FirInverse
+from ..cosim.fir_inverse import FirInverse
 from ..identify.output_error import in_time
 from ..logs.checks import resolution
 from ..logs.units import DisplayUnits

@@ -36,7 +36,7 @@ from .advice import Judged, advice_on, settling_words
 from .build import fit_files, sha256_of, write_commands
 from .choice import Tried, choose_settings, period_finding, settings_to_try, with_window
 from .compensation import LIMITS_WORDS, Tracking, drive_limits, estimated_limits, expected_tracking, taught
-from .plant import IdentifiedPlant, commands_to_try, identified_plant
+from .identified_plant import IdentifiedPlant, commands_to_try, identified_plant
 from .replay import Recording, beginnings, replay, split_log
 
 if TYPE_CHECKING:

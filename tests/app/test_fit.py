@@ -20,7 +20,7 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.cosim.loop import FmuController
 from hybridsep.fitting.build import fit_files
 from hybridsep.fitting.fit import Fit, fit
-from hybridsep.fitting.plant import IdentifiedPlant
+from hybridsep.fitting.identified_plant import IdentifiedPlant
 from hybridsep.fitting.replay import replay, split_log
 from hybridsep.fmi.weights import restore_weights, weights_file
 from hybridsep.logs.checks import Finding

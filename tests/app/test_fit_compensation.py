@@ -19,8 +19,8 @@ from hybridsep.base.errors import ParameterError
 from hybridsep.base.metrics import rms
 from hybridsep.base.settings import CompensatorSettings
 from hybridsep.base.signals import Array
+from hybridsep.cosim.fir_inverse import FirInverse, PlayedCommand
 from hybridsep.cosim.fmu import read_description
-from hybridsep.cosim.inverse import FirInverse, PlayedCommand
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.fitting.compensation import FACTORS, Stretch, binding_words, drive_limits, expected_tracking
 from hybridsep.fitting.expected import Expected, Trial

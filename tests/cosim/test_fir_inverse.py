@@ -5,7 +5,7 @@ import pytest
 
 from hybridsep.base.metrics import rms
 from hybridsep.base.signals import Array
-from hybridsep.cosim.inverse import FirInverse, PlayedCommand
+from hybridsep.cosim.fir_inverse import FirInverse, PlayedCommand
 from hybridsep.cosim.loop import cosimulate
 from hybridsep.model.physics import ModalModel, Mode
 from hybridsep.plants.plant import simulate
