@@ -180,7 +180,7 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
     known = known_names(role, source.names)
     if not known and not (source.axes or axes_of(source.names)):  # in structs, log.x_d, or timeseries, log.x_d.Data
         ends = {name: _DATA.sub("", name).rpartition(".")[2] for name in source.names}
-        known = [name for name in source.names if ends[name] in known_names(role, list(ends.values()))]
+        known = [name for best in [known_names(role, [*ends.values()])] for name in source.names if ends[name] in best]
     if len(set(known)) > 1:
         raise LogError(f"{source.path}: column {role} may be {listed(known)}; name it: --{role} NAME")
     return known[0] if known else None

@@ -27,7 +27,7 @@ LOG = "hybridsep example-log --out my_axis.csv"
 ROWS = 1601
 """Lines of the example log that are left once it is written, and at night once it is fitted: of the others it is tested
 that they work."""
-MOVES = 1500  # samples of the staircase that blocks of Python run by day
+MOVES = 3000  # samples of the staircase that blocks of Python run by day
 MADE = {"README.md": "my_axis/report.html", "read-the-report.md": "replay.html", "close-the-loop.md": "compensated.png"}
 """Files that pages leave."""
 

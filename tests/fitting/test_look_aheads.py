@@ -36,9 +36,10 @@ def axis(model: ModalModel, preview: int, **changed: float) -> Machine:
 
 
 def looked(machine: Machine, recording: Recording) -> LookAheads:
-    stretch = Stretch.of(Trial(machine), [recording])
-    assert stretch is not None
-    return stretch.look_aheads()
+    with Trial.of(machine) as trial:
+        stretch = Stretch.of(trial, [recording])
+        assert stretch is not None
+        return stretch.look_aheads()
 
 
 @pytest.fixture(scope="module")
