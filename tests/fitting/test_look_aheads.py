@@ -155,11 +155,12 @@ def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
 )
 def test_a_stretch_that_is_cut_out_of_motion_is_led_in_and_out_at_rest(x_d: Array, most: float) -> None:
     """A command that never rests: the largest error was that of its step to rest, where the stretch ends."""
-    stretch = Stretch.of(Trial(axis(SERVO, SERVO.look_ahead(T_S))), [Recording(x_d, x_d, 3000)])
-    assert stretch is not None
+    with Trial.of(axis(SERVO, SERVO.look_ahead(T_S))) as trial:
+        stretch = Stretch.of(trial, [Recording(x_d, x_d, 3000)])
+        assert stretch is not None
+        found = stretch.look_aheads()
     speed = np.abs(np.diff(stretch.x_d)) / T_S
     assert max(speed[0], speed[-1]) < 1e-3 * speed.max()
-    found = stretch.look_aheads()
     assert found.tried[-1].left < most * found.off
     assert found.lines() == []
 
