@@ -60,11 +60,6 @@ typedef struct {
     } range[HSEP_ORDERS]; /* the rows of an order that x touches */
 } hsep_problem;
 
-/* Lengths of a step, 0 ... 1. */
-typedef struct {
-    hsep_real primal, dual;
-} interior_lengths;
-
 /* The vector of an array of the slacks `it` at bound r. */
 #define AT(array) (*hsep_lanes_at(it.array + r))
 
@@ -97,7 +92,7 @@ static void interior_give_rows(hsep_problem it, const hsep_real *y, hsep_real si
 
 /* Steps of B dx in ds, ds = B dx + r_p + rho dz and dz = r_c - z (B dx + r_p) / (s + rho z), and their lengths to where
  * all values + length change stay >= 0: the largest -change / value is its inverse. */
-static interior_lengths interior_step(hsep_problem it)
+static void interior_step(hsep_problem it, hsep_real *alpha_p, hsep_real *alpha_d)
 {
     const hsep_real rho = it.rho;
     hsep_lanes primal = {0.0}, dual = primal;
@@ -109,16 +104,17 @@ static interior_lengths interior_step(hsep_problem it)
         dual = hsep_larger(-dz / z, dual);
     }
     const hsep_real of_s = hsep_largest(primal), of_z = hsep_largest(dual);
-    return (interior_lengths){.primal = of_s > 1.0 ? 1.0 / of_s : 1.0, .dual = of_z > 1.0 ? 1.0 / of_z : 1.0};
+    *alpha_p = of_s > 1.0 ? 1.0 / of_s : 1.0;
+    *alpha_d = of_z > 1.0 ? 1.0 / of_z : 1.0;
 }
 
 /* mu after the predictor's step, as far as s and z stay >= 0. */
 static hsep_real interior_predicted(hsep_problem it)
 {
-    const interior_lengths alpha = interior_step(it);
-    hsep_real sums[2] = {0.0, 0.0}; /* two side by side, whatever a vector holds */
+    hsep_real alpha_p, alpha_d, sums[2] = {0.0, 0.0}; /* two side by side, whatever a vector holds */
+    interior_step(it, &alpha_p, &alpha_d);
     for (hsep_int r = 0; r < it.m; r++) {
-        sums[r % 2] += (it.s[r] + alpha.primal * it.ds[r]) * (it.z[r] + alpha.dual * it.dz[r]);
+        sums[r % 2] += (it.s[r] + alpha_p * it.ds[r]) * (it.z[r] + alpha_d * it.dz[r]);
     }
     return (sums[0] + sums[1]) / (hsep_real)it.m;
 }
@@ -126,10 +122,10 @@ static hsep_real interior_predicted(hsep_problem it)
 /* Go by the corrector's step, as far as s and z stay > 0; return the primal length. */
 static hsep_real interior_move(hsep_problem it)
 {
-    const interior_lengths alpha = interior_step(it);
-    const hsep_real primal = alpha.primal >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha.primal;
-    const hsep_real dual = alpha.dual >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha.dual;
-    const hsep_real rho = it.rho;
+    hsep_real alpha_p, alpha_d;
+    interior_step(it, &alpha_p, &alpha_d);
+    const hsep_real primal = alpha_p >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha_p;
+    const hsep_real dual = alpha_d >= 1.0 ? 1.0 : HSEP_QP_TAU * alpha_d, rho = it.rho;
     for (hsep_int r = 0; r < it.m; r += HSEP_LANES) {
         const hsep_lanes s = AT(s) + primal * AT(ds), z = AT(z) + dual * AT(dz);
         AT(s) = s;

@@ -306,12 +306,12 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
 
 /* What parts of a plan count as: columns abreast by an expert; some variances, or those that are apart, which take more
  * samples; what passes through the model or the solver once, for all samples of a plan; and half a prediction of a
- * plan, or the slopes under it. */
+ * plan, the slopes under it, or the jerk of a programme. */
 #define NEWTON_COLUMNS 3
 #define NEWTON_SOME 4
 #define NEWTON_APART 6
 #define NEWTON_PASS 8
-#define NEWTON_PREDICTION 12
+#define NEWTON_PREDICTION 14
 
 /* Parts into which a count is cut, each of at most so many. */
 static hsep_int newton_parts(hsep_int count, hsep_int most) { return (count + most - 1) / most; }
@@ -339,8 +339,8 @@ static hsep_int newton_of_columns(hsep_newton *self, const hsep_newton_task *tas
 static hsep_int newton_of_plan(hsep_newton *self, const hsep_newton_task *task, hsep_int predicted)
 {
     const hsep_int window = self->late + self->Np, beyond = self->preview - self->Np;
-    const hsep_int of_physics = NEWTON_PASS + newton_of_solution(self, 2 * HSEP_NEWTON_PHYSICS_STEPS + 1);
-    hsep_int step = 2 * NEWTON_SOME + 3 * NEWTON_PREDICTION + newton_of_programme(self) +
+    const hsep_int of_physics = NEWTON_PREDICTION + newton_of_solution(self, 2 * HSEP_NEWTON_PHYSICS_STEPS + 1);
+    hsep_int step = NEWTON_SOME + 4 * NEWTON_PREDICTION + newton_of_programme(self) +
                     newton_of_solution(self, 2 * task->planner->steps + 1);
     for (hsep_int i = 0; i < self->m; i += newton_together(task->planner, i)) {
         step += newton_of_columns(self, task, i);
@@ -435,7 +435,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 
         /* The physics model's plan; without one the remainder of the last plan goes on */
         if (self->planned) {
-            NEWTON_YIELD(2, NEWTON_PASS);
+            NEWTON_YIELD(2, NEWTON_PREDICTION);
             newton_open(self, task);
             NEWTON_SOLVE(3, 4, self->follows ? HSEP_NEWTON_PHYSICS_STEPS : planner->steps);
             self->planned = self->status == HSEP_PLAN_DONE;
@@ -451,7 +451,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         self->cost_of_rest = self->cost;
         if (self->ends) {
             newton_copy(self, c, rest);
-            NEWTON_YIELD(5, NEWTON_PASS);
+            NEWTON_YIELD(5, NEWTON_PREDICTION);
             hsep_planner_end(planner, task->x_d);
             NEWTON_SOLVE(6, 7, planner->steps);
         }
@@ -472,7 +472,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
                 NEWTON_YIELD(12, newton_of_columns(self, task, self->spline));
                 newton_columns(self, task);
             }
-            NEWTON_YIELD(13, newton_of_programme(self) + NEWTON_SOME);
+            NEWTON_YIELD(13, newton_of_programme(self) + NEWTON_PREDICTION);
             newton_products(self, planner);
             hsep_planner_complete(planner, planner->jerk_weight);
             NEWTON_SOLVE(14, 15, planner->steps);

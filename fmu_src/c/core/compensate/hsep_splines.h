@@ -123,16 +123,22 @@ static inline void hsep_splines_init(
     }
 }
 
+/* Sum of the first count splines, so many samples behind a knot, with coefficients c, (count,), from spline -3 on. */
+static inline hsep_real splines_behind(
+    const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int knot, hsep_int within)
+{
+    const hsep_real *b = hsep_splines_shape(self) + within;
+    hsep_real sum = 0.0;
+    for (hsep_int i = 0; i <= HSEP_N_DECIDED && knot + i < count; i++) {
+        sum += c[knot + i] * b[(HSEP_N_DECIDED - i) * self->spacing];
+    }
+    return sum;
+}
+
 /* Sum of the first count splines at sample k, with coefficients c, (count,), from spline -3 on. */
 static inline hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int k)
 {
-    const hsep_real *b = hsep_splines_shape(self);
-    const hsep_int place = k / self->spacing, within = k % self->spacing;
-    hsep_real sum = 0.0;
-    for (hsep_int i = 0; i <= HSEP_N_DECIDED && place + i < count; i++) {
-        sum += c[place + i] * b[within + (HSEP_N_DECIDED - i) * self->spacing];
-    }
-    return sum;
+    return splines_behind(self, c, count, k / self->spacing, k % self->spacing);
 }
 
 /* The rows of a change with coefficients c, (count,), of spline first - 3, whose last part acts, and those after it; (4
@@ -141,9 +147,10 @@ static inline void hsep_splines_rows(
     const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int first, hsep_int preview, hsep_real rows[])
 {
     hsep_real now[HSEP_ORDERS] = {0.0};
-    const hsep_int begin = first * self->spacing;
-    for (hsep_int k = 0; k < preview; k++) {
-        hsep_differ(now, k < begin ? 0.0 : hsep_splines_sum(self, c, count, k - begin));
+    for (hsep_int k = 0, knot = 0, within = 0; k < preview; k++) { /* without a division */
+        hsep_differ(now, knot < first ? 0.0 : splines_behind(self, c, count, knot - first, within));
+        within = within + 1 < self->spacing ? within + 1 : 0;
+        knot += within == 0;
         for (unsigned order = 0; order < HSEP_ORDERS; order++) {
             rows[order * preview + k] = now[order] * self->share[order];
         }
