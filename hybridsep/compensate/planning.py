@@ -246,7 +246,7 @@ _DOUBT = 0.1
 of the variances of what is predicted over the plan, weighted as its errors. At rest, before sliding, a model from
 motion predicts errors as small as its noise, and moved the drive for them."""
 
-_STRAIGHT = 20  # parts of a plan of few windows, in the last of which its way back to the path may not turn friction
+_STRAIGHT = 10  # parts of a plan of few windows, in the last of which its way back to the path may not turn friction
 
 _PINNED_AVERAGED = 24
 """Leading samples of a window in which every plan follows the last one, as it takes more work than one on the paper's

@@ -189,12 +189,12 @@ def test_a_plan_takes_less_of_a_change_that_takes_back_the_last_one() -> None:
 
 @pytest.mark.slow
 def test_a_way_back_in_few_windows_does_not_turn_the_command() -> None:
-    """In the last twentieth of a plan of four windows; where it may it does."""
+    """In the last tenth of a plan of four windows; where it may it does."""
     sep, x_d, turns = SepCompensator.from_bytes(learned()), moves()[460:660], []
-    for more in (0, 10):
+    for more in (0, 20):
         sep._planning.n_turning += more  # type: ignore[attr-defined]
         sep.plan(x_d)
-        turns.append(turned((x_d + sep._basis.values @ sep._pending.coefficients)[190:], x_d[190:]))  # type: ignore[union-attr]
+        turns.append(turned((x_d + sep._basis.values @ sep._pending.coefficients)[180:], x_d[180:]))  # type: ignore[union-attr]
     assert turns[0] == 0 < turns[1]
 
 
