@@ -304,12 +304,12 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
-/* What parts of a plan count as: columns abreast by an expert; some variances, or those that are apart, which take more
- * samples; what passes through the model or the solver once, for all samples of a plan; and half a prediction of a
+/* What parts of a plan count as: columns abreast by an expert; some variances, or those behind the window, which take
+ * more samples; what passes through the model or the solver once, for all samples of a plan; and half a prediction of a
  * plan, the slopes under it, or the jerk of a programme. */
 #define NEWTON_COLUMNS 3
 #define NEWTON_SOME 4
-#define NEWTON_APART 6
+#define NEWTON_BEHIND 6
 #define NEWTON_PASS 8
 #define NEWTON_PREDICTION 14
 
@@ -346,7 +346,7 @@ static hsep_int newton_of_plan(hsep_newton *self, const hsep_newton_task *task, 
         step += newton_of_columns(self, task, i);
     }
     return NEWTON_SOME * newton_parts(window - predicted, HSEP_NEWTON_VARIED) +
-           NEWTON_APART * newton_parts(beyond, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) + of_physics +
+           NEWTON_BEHIND * newton_parts(beyond, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) + of_physics +
            self->n_steps * step + 2 * NEWTON_PREDICTION + NEWTON_PASS +
            NEWTON_SOME * newton_parts(window, HSEP_NEWTON_VARIED);
 }
@@ -397,7 +397,7 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
 #define NEWTON_VARY(where, end) \
     while (self->samples < (end)) { \
         NEWTON_YIELD( \
-            where, self->samples > self->late + self->Np ? NEWTON_APART \
+            where, self->samples > self->late + self->Np ? NEWTON_BEHIND \
                                                          : NEWTON_SOME + (self->samples > 0 ? 0 : NEWTON_PASS)); \
         newton_vary(self, task, c); \
     }
@@ -410,7 +410,7 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
         NEWTON_YIELD(then, self->halves % 2 ? NEWTON_PASS : newton_of_programme(self)); \
         self->status = hsep_planner_advance(planner); \
     } \
-    self->left -= newton_of_solution(self, self->halves)
+    self->left -= hsep_min(newton_of_solution(self, self->halves), self->left)
 
 /* Make a plan, from one yield to the next. */
 static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
