@@ -251,7 +251,7 @@ static void interior_residuals(hsep_interior *self, hsep_problem it, const hsep_
                     r_d < self->tolerance.dual_residual);
 }
 
-/* Begin with the bounds as they are, from 0. knots: of the last splines; P: a triangle of m rows; cost: its scale, m2. */
+/* Begin within the bounds as they are, from 0. knots: of the last splines; P: a triangle of n rows; cost: scale, m2. */
 static void hsep_interior_begin(
     hsep_interior *self, const hsep_splines *splines, const hsep_knots *knots, const hsep_real P[], hsep_real cost,
     const hsep_tolerance *tolerance)

@@ -1,7 +1,7 @@
 /* Stops of plans that are longer than the preview; as stop.py.
  *
  * After the preview a plan takes the command to go on at its last velocity. What comes may be another command, so each
- * plan has a stop beside it: it shares the splines that are carried out before the next plan, and then brings the change
+ * plan has a stop beside it: it shares the splines that are carried out before the next plan, then brings the change
  * of the command to a constant within the preview, which takes nothing of the limits of what follows. A plan is carried
  * out as far as it has a stop within the limits; otherwise the last stop goes on.
  */
@@ -43,8 +43,8 @@ static hsep_real hsep_stop_lay_out(hsep_stop *self, const hsep_predictor_paramet
     return end * sizeof(hsep_real);
 }
 
-/* Fill the block, which is 0, with the gains that minimise the sum of squares of the differences of orders 1 to 3, in limits: a backward Riccati
- * recursion (Kalman 1960) from a change that is constant. */
+/* Fill the block, which is 0, with the gains that minimise the sum of squares of the differences of orders 1 to 3, in
+ * limits: a backward Riccati recursion (Kalman 1960) from a change that is constant. */
 static void hsep_stop_init(
     hsep_stop *self, const hsep_predictor_parameters *parameters, hsep_int n_pinned, const hsep_splines *splines)
 {
