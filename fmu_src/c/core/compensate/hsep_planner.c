@@ -80,7 +80,7 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_predictor_paramet
 }
 
 /* Bounds of the rows of a change beyond the first count coefficients of the last plan's remainder, (4 preview,) in
- * shares: the limits, with a share of change_max, without what x_d and these coefficients take of them. Where x_d itself
+ * shares: the limits, with a share of change_max, without what x_d and these coefficients take of them. Where x_d
  * exceeds one within the length of a spline, as a command that is held or rounded does, the limit is wider by that. */
 static void planner_limits(
     const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int preview, hsep_int turns,
