@@ -102,10 +102,8 @@ def _of_orders(R: Array, n_rows: int) -> list[StateSpace]:
 
 
 def _misfit(model: StateSpace, records: Sequence[tuple[Array, Array]], Np: int) -> float:
-    total = 0.0
     with np.errstate(all="ignore"):
-        for u, y in records:
-            z = model.states(u, y)
-            for k in range(_LAGS, len(y), Np):  # before, the state is not known
-                total += float(np.nansum((y[k : k + Np] - model.free_run(z[k], u[k : k + Np])) ** 2))
+        states = [(u, y, model.states(u, y)) for u, y in records]
+        windows = [(slice(k, k + Np), *one) for one in states for k in range(_LAGS, len(one[1]), Np)]  # known by then
+        total = sum(float(np.nansum((y[at] - model.free_run(z[at.start], u[at])) ** 2)) for at, u, y, z in windows)
     return total if np.isfinite(total) else np.inf

@@ -71,8 +71,7 @@ def choose_settings(
         progress((i + 1) / len(candidates))
     best = min(range(len(errors)), key=errors.__getitem__)
     chosen = best if errors[best] < (1.0 - WORTH) * errors[0] else 0
-    tried = [Tried(one.p, one.q, errors[i], i == chosen) for i, one in enumerate(candidates)]
-    return candidates[chosen], tuple(tried)
+    return candidates[chosen], tuple(Tried(one.p, one.q, errors[i], i == chosen) for i, one in enumerate(candidates))
 
 
 def _trained_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> float:

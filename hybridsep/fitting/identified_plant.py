@@ -210,18 +210,14 @@ def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_P
 
 def _rms_of(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece], part: str) -> float:
     """Return the RMS error of a plant over a part of all pieces, m, less the mean error of what was fitted to."""
-    parts = []
-    for piece, error in zip(pieces, _errors(settings, plant, pieces), strict=True):
-        if (wanted := getattr(piece, part)).any():
-            parts.append(error[wanted] - error[piece.fitted if piece.fitted.any() else wanted].mean())
+    each = [(one, getattr(one, part), e) for one, e in zip(pieces, _errors(settings, plant, pieces), strict=True)]
+    parts = [e[i] - e[one.fitted if one.fitted.any() else i].mean() for one, i, e in each if i.any()]
     return rms(np.concatenate(parts)) if parts else math.nan
 
 
 def _noise(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Piece]) -> float:
     """Return the standard deviation of the measurement noise, m, at least the resolution's."""
-    found = []
-    for piece, error in zip(pieces, _errors(settings, plant, pieces), strict=True):
-        known = ~np.isnan(piece.x)
-        x, e = piece.x[known], error[known]
-        found.append(max(min(noise_std(x), noise_std(e)), resolution(x) / math.sqrt(12.0)))
+    both = [np.stack(one) for one in zip((one.x for one in pieces), _errors(settings, plant, pieces), strict=True)]
+    known = [one[:, ~np.isnan(one[0])] for one in both]
+    found = [max(min(noise_std(x), noise_std(e)), resolution(x) / math.sqrt(12.0)) for x, e in known]
     return min(float(np.median(found)), float(PARAMETERS["noise_std"].maximum or 1.0)) if found else 0.0

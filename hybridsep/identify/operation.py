@@ -48,9 +48,9 @@ def identify_operation(
 
     The error of the simulated position is least over poles, zeros, gain, whole samples of dead time and the hold, for
     structures from a mere gain to three modes; offset and state at the start of each recording are estimated beside
-    them. The last 35 % of the commanded motion choose among the structures, fitted to what comes before. Where the
-    chosen one has a long dead time, or hardly any damping, and a second order with a shorter one, or with a usual one
-    and a zero, is as good, that takes its place; the result is then fitted to everything.
+    them. The last 35 % of the commanded motion choose among the structures, fitted to what comes before. A second order
+    takes the place of one that explains little more but friction; and, if it is as good, one with a shorter dead time,
+    or a usual damping and a zero, of one with a long dead time, or hardly any damping. All is then fitted to.
 
     ``recordings``: iterable of pairs ``(x_d, x)`` of (n,), m: commanded and measured positions, one pair for each
     piece without a gap, sampled alike; ``x`` is NaN where it is missing. Such samples are left out of the error, the
@@ -68,7 +68,8 @@ def identify_operation(
     structures = [structure for structure in STRUCTURES if structure.order <= order_max]
     candidates = selection.compare_structures(segments, T_s, structures, progress)
     chosen = selection.with_slow_part(selection.choose(candidates), candidates, segments, T_s)
-    chosen = selection.well_damped(selection.without_long_delay(chosen, segments, T_s), segments, T_s)
+    chosen = selection.without_long_delay(selection.second_order(chosen, candidates, segments, T_s), segments, T_s)
+    chosen = selection.well_damped(chosen, segments, T_s)
     candidates = list({one.structure: one for one in (*candidates, chosen)}.values())
     progress(f"{chosen.structure.name}: all samples", 0.95)
     fit = fit_near(segments, T_s, chosen.fit)
@@ -116,8 +117,7 @@ def _hindrance(segments: Sequence[Segment]) -> str:
         return f"it has {n} samples, at least {SAMPLES_MIN} are needed"
     if all(np.ptp(segment.u) == 0 for segment in segments):
         return "the commanded position does not move; record the axis while it works"
-    measured = [(segment.u[segment.known], segment.y[segment.known]) for segment in segments]
-    if all(np.ptp(y) == 0 for _, y in measured):
+    if all(np.ptp(segment.y[segment.known]) == 0 for segment in segments):
         return "the measured position does not move"
     split = motion_split(segments, 1.0 - selection.HELD_OUT)
     n_fitted = sum(int(segment.known[: segment.stop].sum()) for segment in split)
@@ -158,8 +158,10 @@ def _findings(
         )
     error = float(np.std(np.concatenate([(s.y - s.u)[s.known] for s in segments])))
     if fit.rms > _LEFT * error:
-        why = "friction, a dead band, or what repeats with the command moves its modes by more than their standard "
-        why += "deviations say; record faster" if fit.structure.order else "no loop is seen; record longer, or faster"
+        why = (
+            "friction, a dead band, or what repeats moves its modes by more than their standard deviations say; record"
+        )
+        why = f"{why} faster" if fit.structure.order else "no loop is seen; record longer, or faster"
         findings.append(
             f"the loop is not identified: of a servo error of {shown.words(error)} (standard deviation) the model "
             f"leaves {shown.words(fit.rms)}; {why} motion, which does not help against a dead band (a valve's "

@@ -93,8 +93,7 @@ def _predicted(s: Array, known: Array, e: Array, line: float) -> float:
     for fitted in (first, ~first):
         both = np.column_stack((known, waves))[fitted]
         weights = np.linalg.lstsq(both, e[fitted], rcond=None)[0][-2:]
-        target, told = (part[~fitted] for part in (e, waves @ weights))
-        target, told = without(known[~fitted], target), without(known[~fitted], told)
+        target, told = (without(known[~fitted], part[~fitted]) for part in (e, waves @ weights))
         power = float(target @ target)
         shares.append(1.0 - float(np.sum((target - told) ** 2)) / power if power > 0.0 else 0.0)
     return min(shares)

@@ -117,10 +117,8 @@ def _bandwidth(segments: Sequence[Segment], T_s: float, known: Mapping[Structure
     The error is about ``velocity · lag + acceleration/ω²``; with velocity feed-forward there is no lag.
     """
     lags = [fit for structure, fit in known.items() if structure.lag and not structure.n_modes]
-    rows = []
-    for s in (one for one in segments if one.stop > 1):
-        v = np.gradient(s.u[: s.stop], T_s)
-        rows.append(np.column_stack((v, np.gradient(v, T_s), (s.u - s.y)[: s.stop]))[s.known[: s.stop]])
+    moving = [(s, np.gradient(s.u[: s.stop], T_s)) for s in segments if s.stop > 1]
+    rows = [np.column_stack((v, np.gradient(v, T_s), (s.u - s.y)[: s.stop]))[s.known[: s.stop]] for s, v in moving]
     data = np.concatenate(rows)
     motion, error = data[:, :2], data[:, 2]
     tau, square = np.linalg.lstsq(motion - motion.mean(axis=0), error - error.mean(), rcond=None)[0]

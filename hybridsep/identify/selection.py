@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from ..base.signals import Array, Indices
 from ..model.physics import Mode
-from .output_error import Fit, Segment, fit_structure, motion_split, simulated, without
+from .output_error import Fit, Segment, as_segments, fit_structure, motion_split, simulated, without
 from .search import fit_delay, shorter_delays
 from .structure import RATES_MIN, STRUCTURES, Structure
 from .uncertainty import estimates
@@ -79,10 +79,11 @@ _FITTED_BETTER = 0.7
 """Ratio of the fitted errors at which a larger structure is taken though the held-out errors are alike: most of the
 held-out error may be what no structure explains, such as a first reversal."""
 
-_CANCELLING_WORTH, _HELD_OUT_WORTH = 0.6, 0.75
+_CANCELLING_WORTH, _HELD_OUT_WORTH, _MORE_WORTH = 0.6, 0.75, 0.8
 """Ratios of the errors at which a model with a slow part that its zeros all but cancel is taken, geometric mean of
 fitted and held-out ones, and of only the latter: a slow part that fits friction and cables leaves 0.64 to 0.85, one
-that is in the drive's loops less; friction that creeps looks so while it is fitted, and leaves 0.8 to 1 later."""
+that is in the drive's loops less; friction that creeps looks so while it is fitted, and leaves 0.8 to 1 later. And the
+ratio, beside friction, at which poles are taken that are no slow part."""
 
 _CREEPS = 5.0  # ratio of the rates at which friction may follow the command's sign
 
@@ -201,11 +202,10 @@ def with_slow_part(
     log tells the other one. Friction that creeps does not, or what follows the command's sign as slowly explains it.
     """
     split = motion_split(segments, 1.0 - HELD_OUT)
-    better = [c for c in candidates if c.rms_held_out < _HELD_OUT_WORTH * chosen.rms_held_out]
-    left = [c for c in better if c.objection in ("", *_UNCERTAIN) and c.slow_parts]
+    allowed = [c for c in candidates if c.objection in ("", *_UNCERTAIN) and c.slow_parts]
+    left = [c for c in allowed if c.rms_held_out < _HELD_OUT_WORTH * chosen.rms_held_out]
     earlier = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in split if s.known[: s.stop].sum() > 1]
-    ends = [(s.u[s.stop :], s.y[s.stop :]) for s in split if s.known[s.stop :].sum() > 1]
-    later = [Segment(u - u[0], y - u[0], len(u)) for u, y in ends]
+    later = as_segments((s.u[s.stop :], s.y[s.stop :]) for s in split if s.known[s.stop :].sum() > 1)
 
     def back(fit: Fit) -> float:  # its error, m, on the earlier part, fitted to the later one
         again = fit_structure(later, T_s, fit.structure, fit.delay, [fit.theta], fit.slowest)
@@ -215,11 +215,23 @@ def with_slow_part(
     most = _HELD_OUT_WORTH * back(chosen.fit) if left else 0.0
     while left:
         candidate = _chosen_of(left)
-        is_linear = _beside_friction(chosen.fit, candidate.fit, segments, T_s) < _CANCELLING_WORTH
-        if is_linear and back(candidate.fit) < most:
+        of_friction = _beside_friction(chosen.fit, candidate.fit, segments, T_s)
+        if of_friction < _CANCELLING_WORTH and back(candidate.fit) < most:
             return replace(candidate, objection="")
         left.remove(candidate)
     return chosen
+
+
+def second_order(chosen: Candidate, tried: Sequence[Candidate], segments: Sequence[Segment], T_s: float) -> Candidate:
+    """Return a second order beside which a larger chosen one explains little but friction, or the chosen one.
+
+    Poles that stand for friction are right for one motion, and make plans as long as they are slow; it is learned.
+    """
+    worth = _CANCELLING_WORTH if chosen.slow_parts else _MORE_WORTH
+    small = [c for c in tried if 0 < c.structure.order <= 2 < chosen.structure.order and not c.objection]
+    like = (c for c in small if _beside_friction(c.fit, chosen.fit, segments, T_s) > worth)
+    found = (without_long_delay(c, segments, T_s) for c in like)  # a lag's dead time may stand for a pole
+    return next((second for second in found if second.structure.order == 2), chosen)
 
 
 def _beside_friction(fit: Fit, other: Fit, segments: Sequence[Segment], T_s: float) -> float:
@@ -269,9 +281,8 @@ def _chosen_of(usable: Sequence[Candidate]) -> Candidate:
     """Return the simplest of these candidates that is as good as the best, as :func:`choose` does."""
     best = min(usable, key=lambda candidate: candidate.rms_held_out)
     by_size = sorted(usable, key=lambda candidate: candidate.structure.n_parameters)
-    alike = [candidate for candidate in by_size if _as_good(candidate, best)]
-    chosen = alike[0]
-    for candidate in alike[1:]:
+    chosen, *others = (candidate for candidate in by_size if _as_good(candidate, best))
+    for candidate in others:
         if candidate.fit.rms < _FITTED_BETTER * chosen.fit.rms:
             chosen = candidate
     free = replace(chosen.structure, unit_gain=False)

@@ -51,8 +51,7 @@ def estimates(fit: Fit, segments: Sequence[Segment], T_s: float, unit: str = "m"
 
 def _sandwich(jacobian: Array, scores: Array) -> Array:
     bread = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-12, hermitian=True)
-    covariance: Array = bread @ (scores.T @ scores) @ bread * (len(scores) / max(1, len(scores) - 1))
-    return covariance
+    return np.asarray(bread @ (scores.T @ scores) @ bread * (len(scores) / max(1, len(scores) - 1)))
 
 
 def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array, Array]:

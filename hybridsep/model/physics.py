@@ -265,9 +265,7 @@ def _partial_fractions(quadratics: list[Array], numerator: Array) -> Array:
     for others, some in combinations(map(np.roots, quadratics), 2):
         if np.any(np.abs(some[:, None] - others[None, :]) < _REPEATED * np.abs(others)):
             raise ModelError(_REPEATED_MODES)
-    columns = []
-    for i in range(m):
-        rest = reduce(np.polymul, quadratics[:i] + quadratics[i + 1 :], np.array([1.0]))
-        columns += [np.pad(one, (2 * m - len(one), 0)) for one in (rest, np.append(rest, 0.0))]
+    rests = [reduce(np.polymul, quadratics[:i] + quadratics[i + 1 :], np.array([1.0])) for i in range(m)]
+    columns = [np.pad(one, (2 * m - len(one), 0)) for rest in rests for one in (rest, np.append(rest, 0.0))]
     solution: Array = np.linalg.solve(np.array(columns).T, np.pad(numerator, (2 * m - len(numerator), 0)))
     return solution.reshape(m, 2)

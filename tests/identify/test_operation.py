@@ -52,22 +52,22 @@ def test_a_lag_with_dead_time_is_found() -> None:
 
 
 @pytest.mark.slow
-def test_an_arm_that_sags_has_poles_not_a_dead_time() -> None:
-    """A PD servo of 3.56 Hz, ζ 0.56, a sample late, whose load sags by cos(x): a lag with 58 ms fits 7 % better."""
+@pytest.mark.parametrize(("sag", "friction"), [(60.0, 6.0), (0.0, 30.0)])
+def test_an_arm_that_sags_or_rubs_has_poles_not_a_dead_time(sag: float, friction: float) -> None:
+    """A PD servo of 3.56 Hz, ζ 0.56, a sample late: sagging by cos(x) a lag and 58 ms, rubbed two modes, fit better."""
     x_d, T_s = _reaches(6000, 2e-3), 2e-3
-    x, position, velocity = np.empty_like(x_d), x_d[0] - 0.03 * np.cos(x_d[0]), 0.0
+    x, position, velocity = np.empty_like(x_d), x_d[0] - sag / 2000.0 * np.cos(x_d[0]), 0.0
     for k, late in enumerate(np.concatenate((x_d[:1], x_d[:-1]))):
         x[k] = position
         for _ in range(8):
-            friction = 6.0 * np.tanh(velocity / 0.01)
-            torque = 2000.0 * (late - position) - 100.0 * velocity - 60.0 * np.cos(position) - friction
-            velocity += torque / 4.0 * T_s / 8
+            rubs = 100.0 * velocity + friction * np.tanh(velocity / 0.01)
+            velocity += (2000.0 * (late - position) - sag * np.cos(position) - rubs) / 4.0 * T_s / 8
             position += velocity * T_s / 8
     found = identify_operation([(x_d, x)], T_s, unit="rad")
     assert found.structure.startswith("second order, gain")
     assert found.model.dead_time <= 2
-    f_n, zeta = (value(found, f"mode[1].{name}")[0] for name in ("f_n", "zeta"))
-    assert (f_n, zeta) == pytest.approx((3.56, 0.56), rel=0.2)
+    assert value(found, "mode[1].f_n")[0] == pytest.approx(3.56, rel=0.2)
+    assert value(found, "mode[1].zeta")[0] == pytest.approx(0.56, rel=0.2 if sag else 0.8)
 
 
 @pytest.mark.slow
