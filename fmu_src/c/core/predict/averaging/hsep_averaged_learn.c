@@ -190,11 +190,11 @@ static void averaged_bridge(const hsep_averaged *self, hsep_real e[], hsep_int b
 static void averaged_follow_sample(hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], int fold)
 {
     const hsep_int k = self->followed++, j = self->Np - 1 - k;
-    const hsep_real measured = hsep_at(self, self->measured)[j] - x_pb[j];
-    const int accepted = hsep_gate_judge(&self->reach, measured, self->T_s);
+    const hsep_real measured = hsep_at(self, self->measured)[j];
+    const int accepted = hsep_gate_judge(&self->reach, measured, x_pb[j], self->T_s);
     hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
     if (accepted) {
-        e[j] = measured;
+        e[j] = measured - x_pb[j];
         averaged_bridge(self, e, j + 1);
         averaged_take_rows(self, x_pb, e, k + 1);
         self->n_accepted += 1.0;

@@ -141,8 +141,8 @@ HSEP_API void hsep_averaged_restart(hsep_averaged *self)
     self->leading = hsep_stack_leader(&learned->stacks[HSEP_OF_PREDICTIONS]);
     hsep_expert_init(hsep_averaged_expert(self, HSEP_FRESH_START), averaged_shape(self, HSEP_FRESH_START));
     *doubting = (hsep_expert_errors){0.0, 1.0};
-    self->reach.n_missing = self->reach.n_beyond = self->followed = self->known = 0;
-    self->reach.farthest = 0.0;
+    self->reach = (hsep_gate){0};
+    self->followed = self->known = 0;
     for (hsep_int i = 0; i < HSEP_N_STACKS; i++) {
         hsep_stack_forget(&learned->stacks[i], HSEP_FRESH_START);
         if (hsep_averaged_doubts(self)) {
