@@ -260,9 +260,7 @@ HSEP_API int hsep_compensator_change(
 
 HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level)
 {
-    if (level && !self->was_reset) {
-        self->over = 0;
-    }
+    self->over = level && !self->was_reset ? 0 : self->over;
     self->was_reset = level != 0;
 }
 
@@ -299,10 +297,8 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
 }
 
-/* Count what is missing, and what follows the command as it came, m, too badly; NaN: missing; or, in the geometric
- * mean, this command and the one that was sent. Where its change, m, helps, the one error falls and the other one stays
- * as it was without the change; where it does not, for want of force, or as the sensor is wrong, both grow. Return
- * whether it is within the limit, and nothing has tripped: what is not is not learned. */
+/* Count errors behind the command, m, that are missing (NaN), or too large, by themselves or in the mean with the one
+ * behind the changed command; return whether all is well, and may be learned: online/monitor.py, which says why. */
 static int compensator_monitor(hsep_compensator *self, hsep_real error, hsep_real change)
 {
     if (isnan(error)) {

@@ -37,8 +37,7 @@ struct hsep_compensator {
     hsep_real first_load;      /* and that of the first sample, from which it counts, as positions do from the start */
     hsep_int x_dm;             /* (Np,) m, the window: modified commands; before it the last ones not measured yet */
     hsep_int loads;            /* (preview,) m, ring of the loads that came last, */
-    hsep_int load;      /* (horizon,) m, of the window and of what follows it, too: the drive moves as by that much
-                           more command */
+    hsep_int load;             /* (horizon,) m, of the window and of what follows it, as so much more command */
     hsep_int trial_x;   /* (horizon + q,) m, x_pb of a trial, newest first; then the hybrid model's filtered spline */
     hsep_int trial_e;   /* (horizon + p,) m, its residuals */
     hsep_int target;    /* (horizon,) m */

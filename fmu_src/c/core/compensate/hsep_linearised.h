@@ -256,8 +256,7 @@ static void hsep_linearised_begin(
 }
 
 /* Linearise at commands x_d that the model was last tried with, with the response x_pb, both (n,), m, newest first.
- * reach: half of the change of velocity that the friction's slope is taken over, relative to the velocity scale; 0: the
- * tangent. */
+ * reach: half of the change of velocity that friction's slope is taken over, in velocity scales; 0: the tangent. */
 static void hsep_linearised_at(
     hsep_linearised *self, hsep_averaged *model, const hsep_real x_d[], const hsep_real x_pb[], hsep_real reach)
 {

@@ -161,9 +161,8 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
     }
     hsep_linearised_columns(linearised, task->model, from, apart, count, columns);
     for (hsep_int c = 0; c < count; c++) {
-        const hsep_int begin = from + c * apart;
-        for (hsep_int k = begin; k < self->preview; k++) {
-            columns[c][k - begin] *= weight[k];
+        for (hsep_int k = from + c * apart; k < self->preview; k++) {
+            columns[c][k - from - c * apart] *= weight[k];
         }
     }
     self->spline += count;
@@ -374,8 +373,7 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
 }
 
 /* Cut a plan: what follows counts as so much, and is done when newton_go_on is called again; where: another one for
- * each. A switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006), with what the block
- * has. */
+ * each. A switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006). */
 #define NEWTON_MADE 99 /* place behind the last yield */
 #define NEWTON_YIELD(where, count) \
     do { \

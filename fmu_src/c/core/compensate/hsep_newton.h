@@ -4,8 +4,7 @@
  * delta. Each of one to three Gauss-Newton steps solves the quadratic programme of the model linearised at the best
  * plan so far, friction over what the step before changed, and goes to its minimum if that lowers the cost; else it is
  * the last. Once it has learned, the averaged model judges all plans: its own, the physics model's, and the remainder
- * of the last one; the best is taken, of its own change of the last one a share. Where compensation is off a plan ends
- * it.
+ * of the last one; the best is taken, of its own change of the last one a share. Where it is off a plan ends it.
  *
  * A plan is one function in reading order, cut by yields into short parts, each of which counts as a few; the longest
  * plan is counted, and hsep_newton_run does a sample's equal share of it.
@@ -79,14 +78,12 @@ typedef struct {
 
 HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_parameters *parameters);
 
-/* Fill the block, which is 0, with the planner that solves its plans and a spline filtered by the physics model,
- * (preview,), m/m. */
+/* Fill the block, which is 0, with the planner that solves its plans, and a spline behind G_pb, (preview,), m/m. */
 HSEP_API void hsep_newton_init(
     hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan, but only samples that the plan leaves as they are,
- * and late ones. best: best model allowed, 0 none, 1 physics, 2 averaged, which judges plans once the warm-up is over.
- */
+ * and late ones. best: model allowed, 0 none, 1 physics, 2 averaged, which judges plans once the warm-up is over. */
 HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best);
 
 /* Do parts of the plan: this sample's equal share of what is left, samples being left until the plan is due; all of it

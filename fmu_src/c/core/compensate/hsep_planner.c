@@ -252,7 +252,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
     const hsep_int n = self->solved.m;
     const hsep_splines *splines = hsep_planner_splines(self);
     const hsep_problem problem = planner_problem(self);
-    hsep_real *free_minimum = problem.x, cost = 0.0, finite = 0.0;
+    hsep_real *free_minimum = problem.x, cost = 0.0;
     hsep_copy(problem.factor, hsep_planner_quadratic(self), (hsep_int)hsep_triangle(n));
     if (!hsep_cholesky_rows(problem.factor, n, 0, n, NULL)) {
         return HSEP_PLAN_FAILED;
@@ -261,9 +261,8 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
     hsep_cholesky_solve(problem.factor, n, free_minimum);
     for (hsep_int j = 0; j < n; j++) {
         cost += problem.v[j] * free_minimum[j];
-        finite += hsep_fabs(free_minimum[j]);
     }
-    if (!isfinite(finite)) {
+    if (!isfinite(cost)) {
         return HSEP_PLAN_FAILED;
     }
     planner_rows(self, free_minimum, problem.low);

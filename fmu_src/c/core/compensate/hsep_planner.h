@@ -69,7 +69,7 @@ static inline hsep_int hsep_planner_pinned(const hsep_planner *self)
 /* Begin a plan, a change of the last one's remainder. x_d: commanded positions, m, (preview,); turns: first samples in
  * which it may turn where no_reversal forbids it; change: share of change_max that bounds it. The cost is
  * 1/2 x' P x - v' x of a change by the splines of the planner's knots. The caller sets the triangle P of m rows and v,
- * (m,), m; hsep_planner_complete adds the jerk's, times a weight, to v, and to P with what makes it positive definite. */
+ * (m,); hsep_planner_complete adds the jerk's, times a weight, to v, and to P with what makes it positive definite. */
 HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], hsep_int turns, hsep_real change);
 static inline hsep_real *hsep_planner_quadratic(hsep_planner *self) { return hsep_at(self, self->P); }
 HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);

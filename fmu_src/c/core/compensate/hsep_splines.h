@@ -141,8 +141,7 @@ static inline hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_re
     return splines_behind(self, c, count, k / self->spacing, k % self->spacing);
 }
 
-/* The rows of a change with coefficients c, (count,), of spline first - 3, whose last part acts, and those after it; (4
- * preview,). */
+/* Rows, (4 preview,), of a change by c, (count,): of spline first - 3, whose last part acts, and those after it. */
 static inline void hsep_splines_rows(
     const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int first, hsep_int preview, hsep_real rows[])
 {

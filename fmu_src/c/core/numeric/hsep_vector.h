@@ -117,11 +117,10 @@ static inline hsep_real hsep_recur(hsep_real start, const hsep_real w[], const h
 static inline void hsep_axpy(hsep_real *restrict y, hsep_real a, const hsep_real *restrict x, hsep_int n)
 {
     const hsep_int whole = n - n % HSEP_LANES;
-    hsep_int j = 0;
-    for (; j < whole; j += HSEP_LANES) {
+    for (hsep_int j = 0; j < whole; j += HSEP_LANES) {
         *hsep_lanes_at(y + j) += a * *hsep_lanes_const(x + j);
     }
-    for (; j < n; j++) {
+    for (hsep_int j = whole; j < n; j++) {
         y[j] += a * x[j];
     }
 }
