@@ -26,8 +26,8 @@ static inline void hsep_gate_begin(hsep_gate *self, hsep_real largest, hsep_real
     self->known = largest > 0.0 && fastest > 0.0;
 }
 
-/* Judge its next sample, x, m, NaN where it is missing; return whether it is believed. Before the first motion, and over
- * the first window that has a residual, all are. x_pb: m, the physics model's; T_s: s. Constant cost. */
+/* Judge its next sample, x, m, NaN where it is missing; return whether it is believed. Before the first motion, and
+ * over the first window that has a residual, all are. x_pb: m, the physics model's; T_s: s. Constant cost. */
 static inline int hsep_gate_judge(hsep_gate *self, hsep_real x, hsep_real x_pb, hsep_real T_s)
 {
     const hsep_real size = hsep_fabs(x - x_pb), change = self->last != 0.0 ? hsep_fabs(x - self->last) : 0.0;
