@@ -10,10 +10,10 @@ typedef struct {
     hsep_int n_missing; /* samples since the last one that was believed, */
     hsep_int n_beyond;  /* of these, values out of reach, less values within reach that followed */
     hsep_real farthest; /* m, largest residual out of reach among them */
-    hsep_real largest;  /* m, largest residual believed */
-    hsep_real fastest;  /* m, largest change of x_pb from sample to sample so far, of the window, too */
     hsep_real last;     /* m, last measured position of the run; 0: none yet */
     hsep_real finest;   /* m, the least change of it from sample to sample that is one; 0: none yet */
+    hsep_real largest;  /* m, largest residual believed */
+    hsep_real fastest;  /* m, largest change of x_pb from sample to sample so far, of the window, too */
     hsep_int known;     /* whether there was a motion, and a residual, before the window */
 } hsep_gate;
 HSEP_ASSERT_WORDS(hsep_gate, 8);
