@@ -32,8 +32,8 @@ from benchmarks.outside.controller import Controller
 from hybridsep.base.metrics import ErrorSize
 from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fitting.compensation import estimated_limits
 from hybridsep.fitting.fit import Fit, fit
+from hybridsep.fitting.limits import estimated_limits
 from hybridsep.fitting.replay import Recording
 from hybridsep.identify.model import machine_of
 from hybridsep.machines.machine import Machine

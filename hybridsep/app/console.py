@@ -169,7 +169,7 @@ def print_channels(logs: Sequence[Path], *, as_json: bool) -> None:
 
 def warn_of_estimates(machines: "Iterable[Machine]") -> None:
     """Say on standard error whose limits of the drive are estimated from a log's motion."""
-    from ..fitting.compensation import LIMITS_WORDS
+    from ..fitting.limits import LIMITS_WORDS
 
     for machine in machines:
         if machine.drive_limits is not None and machine.drive_limits.estimated:

@@ -193,7 +193,7 @@ def _say_optimistic(*machines: Machine) -> None:
 
 def _path_limits(axis: Machine) -> tuple[float, ...]:
     """Return velocity, acceleration and jerk for paths: ``[limits]``, or the drive's with the room of a fit's."""
-    from ..fitting.compensation import MARGINS
+    from ..fitting.limits import MARGINS
 
     drive, _ = axis.command_limits()
     if axis.limits is not None or drive is None:

@@ -82,8 +82,8 @@ def fit(
     found = [read_log(path, **reading.arguments()) for path in logs]
     # What computes takes seconds to import: a log that cannot be read is said before
     from ..fitting.build import fit_files
-    from ..fitting.compensation import drive_limits
     from ..fitting.fit import fit as fit_logs
+    from ..fitting.limits import drive_limits
     from ..logs.checks import findings_table
     from .console import console, print_json, progress_bar
     from .logs import different_logs, show

@@ -117,7 +117,7 @@ def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
     return _in_the_place_of("reading", list(options), lambda values: ReadingOptions(**values), command)
 
 
-# In words what `fitting.compensation.estimated_limits` computes, whose import every --help would wait for
+# In words what `fitting.limits.estimated_limits` computes, whose import every --help would wait for
 _LEFT_OUT = {"v_max": "1.25 times the log's", "a_max": "twice the log's", "j_max": "5 times the log's"}
 _LEFT_OUT |= {"change_max": "twice the log's largest servo error", "following_error_max": "1.3 times that error"}
 

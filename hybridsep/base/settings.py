@@ -432,10 +432,7 @@ PARAMETERS: Mapping[str, Parameter] = {
 }
 """All parameters by their names in FMUs."""
 
-DRIVE_LIMIT_ENTRIES = {
-    **Limits.parameters(),
-    **{name: PARAMETERS[name] for name in ("change_max", "following_error_max")},
-}
+DRIVE_LIMIT_ENTRIES = Limits.parameters() | {one: PARAMETERS[one] for one in ("change_max", "following_error_max")}
 """Parameters of the section ``[drive_limits]`` of a machine file, by their entries."""
 
 

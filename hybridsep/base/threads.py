@@ -38,7 +38,4 @@ def _controller() -> ThreadpoolController:
 
 
 one_blas_thread = _OneThread()
-"""Around a window or a whole run: it costs 10 µs where more threads are set, 1 µs where one is, or within another use.
-
-The previous limit is restored.
-"""
+"""Around a window or a whole run, after which the limit is as before: it costs 10 µs where more are set, else 1 µs."""

@@ -14,8 +14,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 
 def version_text() -> str:
     """Return the version with the commit, as ``0.1.0 (1a2b3c4d5e6f)``; without one only the version."""
-    made_from = commit()
-    return f"{__version__} ({made_from})" if made_from else __version__
+    return f"{__version__} ({made_from})" if (made_from := commit()) else __version__
 
 
 def commit(root: Path = _ROOT) -> str:

@@ -1,4 +1,4 @@
-"""Compensation in ``hybridsep fit``: the drive's limits, and the tracking error to be expected without and with it."""
+"""Compensation in ``hybridsep fit``: the tracking error to be expected without and with it, and what limits it."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -7,42 +7,21 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..base.errors import FmuError, ParameterError, SignalError
+from ..base.errors import FmuError, SignalError
 from ..base.metrics import ErrorSize, largest, rms
-from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, CompensatorSettings, Limits
+from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, CompensatorSettings
 from ..base.signals import Array
 from ..compensate.planning import FASTER
 from ..cosim.fir_inverse import FirInverse
 from ..identify.output_error import in_time
-from ..logs.checks import resolution
 from ..logs.units import DisplayUnits
 from ..machines.machine import Machine
 from ..model.physics import least_look_ahead
 from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from .expected import Expected, Trial, limits_that_bind
+from .limits import FOLLOWING_ERROR, STEPS, held_for, largest_motion, rounding_of
 from .replay import Recording, beginnings, replay
-
-MARGINS = np.array([1.25, 2.0, 5.0])
-"""Limits of velocity, acceleration and jerk relative to a log's largest, as in the machine files that come with the
-library."""
-
-_ROUNDING = 0.1  # most that rounding may have of the largest difference of commands, from which motion is estimated
-_OVER = tuple(sorted({round(1.25**i) for i in range(40)}))  # samples that such a difference may be over
-_HELD, _STEPS = 0.1, 100  # quantile of the intervals between changes for which a command is held; fewer are steps
-
-_ZERO, _VARIES = 10.0, 0.999
-"""Offset of command and measurement, relative to what the error varies by in this share of the samples, from which on
-limits do not count it: a compensator would move the axis by as much, and nothing would trip."""
-
-_FOLLOWING_ERROR = 1.3
-"""``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
-error below that was above it (``python -m benchmarks.faults``)."""
-
-LIMITS_WORDS = (  # what the limits of :func:`estimated_limits` are
-    f"estimates, {', '.join(f'{one:g}' for one in MARGINS.tolist())} times the largest velocity, acceleration and jerk "
-    "of the log; replace them by your drive's, and take out estimated = true, before a compensator moves it"
-)
 
 _SCALE = 0.05
 """Velocity scale of what a compensator begins with, relative to the largest velocity of a log. A log's first motion may
@@ -51,85 +30,11 @@ times the error of a cold one instead of 0.97. Mere predictions are 2 % worse wi
 
 FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to say what it costs
 _GAIN = 0.05  # relative gain from which on a limit twice as large, or a longer look-ahead, is advised
-
 _TRIED_MAX = 10_000  # leading samples on which a compensator is tried
 _AHEAD = (0.025, 0.05, 0.1, 0.2, 0.4)  # look-aheads, s, that are tried, doubled until a quarter of the model's is there
 _LIGHTER = 1e-3  # ``jerk_weight`` relative to the machine's with which plans that it binds leave less
 _LITTLE = 0.01  # share of the error without compensation below which errors are alike
-
 _EXPLAINED = 0.7  # share of the error that the physics model's compensation leaves, from which on it knows little
-
-
-def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
-    """Return the entries of ``[drive_limits]`` of options by their names; empty without any.
-
-    What of the others is left out follows from the log. ParameterError if some of the three limits are missing.
-    """
-    found = {entry: one.checked(given[one.name]) for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
-    names = [parameter.name for parameter in Limits.parameters().values()]
-    if found and (left := [name for name in names if name not in given]):
-        raise ParameterError(f"a compensator needs the drive's limits {', '.join(names)}; missing: {', '.join(left)}")
-    return found
-
-
-def held_for(x_d: Array) -> int:
-    """Return for how many samples each command is held, or rounded to the same."""
-    intervals = np.diff(np.flatnonzero(np.diff(x_d)))
-    return int(np.quantile(intervals, _HELD)) if len(intervals) > _STEPS else 1
-
-
-def rounding_of(x_d: Array) -> float:
-    """Return the step to which commands are rounded, m.
-
-    Rounding is white noise where they move, but not at every speed, and no more than their smallest change.
-    """
-    rough = np.abs(np.diff(x_d, 5))[x_d[5:] != x_d[:-5]]
-    noise = float(np.quantile(rough, 0.9)) / (1.645 * math.sqrt(252.0)) if len(rough) else 0.0
-    return min(resolution(x_d), math.sqrt(12.0) * noise)
-
-
-def _motion(x_d: Array, T_s: float) -> list[float]:
-    """Return the largest velocity, acceleration and jerk of commands, ``(n,)``, without what holds and rounds them.
-
-    Differences are over as many samples as a command is held for, and as make its rounding small against them.
-    """
-    held = held_for(x_d)
-    x_d, T_s = x_d[::held], held * T_s
-    rounding, found = rounding_of(x_d), []
-    for order in (1, 2, 3):
-        sizes = {n: largest(np.diff(x_d[: len(x_d) // n * n].reshape(-1, n), order, axis=0)) for n in _OVER}
-        n = next((n for n, size in sizes.items() if 2 ** (order - 1) * rounding <= _ROUNDING * size), 1)
-        found.append(sizes[n] / (n * T_s) ** order)
-    return found
-
-
-def _largest_error(error: Array) -> float:
-    """Return the largest servo error of a log, ``(n,)``, m: about its median where that is an offset."""
-    median = float(np.nanmedian(error))
-    varies = np.abs(error - median)
-    is_offset = 0.0 < _ZERO * float(np.nanquantile(varies, _VARIES)) < abs(median)
-    return float(np.nanmax(varies if is_offset else np.abs(error)))
-
-
-def largest_motion(recordings: Sequence[Recording], T_s: float) -> tuple[Array, float]:
-    """Return the largest velocity, acceleration and jerk of the commands, ``(3,)``, and the largest servo error, m."""
-    peaks = np.array([_motion(one.x_d, T_s) for one in recordings]).reshape(-1, 3).max(axis=0, initial=0.0)
-    measured = [error for error in (one.x_d - one.x for one in recordings) if np.isfinite(error).any()]
-    return peaks, max(map(_largest_error, measured), default=0.0)
-
-
-def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, Any]:
-    """Return entries of ``[drive_limits]`` from the motion of the commands, marked as estimates; empty without motion.
-
-    They are :data:`MARGINS` times the largest velocity, acceleration and jerk; the command may change by twice the
-    largest servo error, and the compensator trips above :data:`_FOLLOWING_ERROR` times it.
-    """
-    peaks, error = largest_motion(recordings, T_s)
-    bounds = (*(MARGINS * peaks).tolist(), 2.0 * error, _FOLLOWING_ERROR * error)
-    values = list(zip(DRIVE_LIMIT_ENTRIES.items(), bounds, strict=True))
-    if not all(value >= (one.minimum or one.nonzero) for (_, one), value in values):
-        return {}
-    return {**{name: min(float(f"{value:.4g}"), one.maximum) for (name, one), value in values}, "estimated": True}
 
 
 @dataclass(frozen=True)
@@ -282,7 +187,7 @@ class Tracking:
         if self.change_max is not None:
             lines[-1] += (
                 " For a program whose largest servo error is above the log's, set change_max to twice that error"
-                + (f" and following_error_max to {_FOLLOWING_ERROR:g} times that error" if monitored else "")
+                + (f" and following_error_max to {FOLLOWING_ERROR:g} times that error" if monitored else "")
                 + f"; motion more than {FASTER:g} times as fast as all that was learned may use half of change_max at "
                 "first."
             )
@@ -365,7 +270,7 @@ def expected_tracking(
     none, physics, hybrid = map(ErrorSize.of, (without, *(one.compensated for one in judged.values())))
     inverse, limits = _inverted(machine, first), (allowed.change_max, allowed.following_error_max)
     motion, error = largest_motion(recordings, machine.T_s)
-    commands = [one.x_d for one in recordings if np.count_nonzero(np.diff(one.x_d)) > _STEPS]  # fewer are steps
+    commands = [one.x_d for one in recordings if np.count_nonzero(np.diff(one.x_d)) > STEPS]  # fewer are steps
     drive = {} if allowed.limits is None else allowed.limits.to_fmi()
     reached = {name: (size, most) for size, (name, most) in zip(motion.tolist(), drive.items(), strict=False)}
     return Tracking(

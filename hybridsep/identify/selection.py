@@ -59,8 +59,7 @@ TOLERANCE = 0.02  # relative increase of the held-out error that a simpler struc
 
 _EXCESS_MAX = 0.1
 """Relative increase of the held-out error that a simpler structure may have within the standard error: few blocks
-whose errors are alike tell little. With a shorter dead time, or more damping, the product of fitted and held-out error
-may have it."""
+whose errors are alike tell little. With less dead time, or more damping, that of fitted times held-out error."""
 
 _GAIN_MAX = 10.0
 """Largest static gain, and inverse of the smallest one, of a position loop: what friction holds seems to have a smaller

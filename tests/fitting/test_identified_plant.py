@@ -9,8 +9,8 @@ from hybridsep import Limits, ModalModel, Mode, rest_to_rest, simulate
 from hybridsep.base.metrics import peak_derivatives
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
-from hybridsep.fitting.compensation import estimated_limits, held_for, largest_motion, rounding_of
 from hybridsep.fitting.identified_plant import commands_to_try, identified_plant
+from hybridsep.fitting.limits import estimated_limits, held_for, largest_motion, rounding_of
 from hybridsep.fitting.replay import Recording
 from hybridsep.logs.units import shown_in
 from hybridsep.plants.stage_drive import StageDrive

@@ -42,8 +42,8 @@ def gated(
     believed, n_missing, n_beyond, farthest = np.isfinite(x), gate.n_missing, gate.n_beyond, gate.farthest
     sizes, measured, finest = np.abs(x - x_pb), x[believed], np.zeros(len(x))
     before = np.append(gate.last, measured)
-    changes = np.where(before[:-1] != 0.0, np.abs(np.diff(before)), 0.0)
-    least = np.minimum.accumulate(np.append(gate.finest or np.inf, np.where(changes > 0.0, changes, np.inf)))
+    changes = np.where((before[:-1] != 0.0) & (np.diff(before) != 0.0), np.abs(np.diff(before)), np.inf)
+    least = np.minimum.accumulate(np.append(gate.finest or np.inf, changes))
     least[np.isinf(least)] = 0.0
     finest[believed], last = least[1:], float(before[-1])
     if n_beyond == 0 and sizes.max() <= CONSTANTS.gate * (largest + fastest):  # no NaN, and nothing beyond

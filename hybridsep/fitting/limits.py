@@ -1,0 +1,106 @@
+"""A drive's limits, given or estimated from the motion of a log, and what holds and rounds its commands."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import ParameterError
+from ..base.metrics import largest
+from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
+from ..base.signals import Array
+from ..logs.checks import resolution
+from .replay import Recording
+
+MARGINS = np.array([1.25, 2.0, 5.0])
+"""Limits of velocity, acceleration and jerk relative to a log's largest, as in the library's machine files."""
+
+_ROUNDING = 0.1  # most that rounding may have of the largest difference of commands, from which motion is estimated
+_OVER = tuple(sorted({round(1.25**i) for i in range(40)}))  # samples that such a difference may be over
+_HELD, STEPS = 0.1, 100  # quantile of the intervals between changes for which a command is held; fewer are steps
+
+_ZERO, _VARIES = 10.0, 0.999
+"""Offset of command and measurement, relative to what the error varies by in this share of the samples, from which on
+limits do not count it: a compensator would move the axis by as much, and nothing would trip."""
+
+FOLLOWING_ERROR = 1.3
+"""``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
+error below that was above it (``python -m benchmarks.faults``)."""
+
+LIMITS_WORDS = (  # what the limits of :func:`estimated_limits` are
+    f"estimates, {', '.join(f'{one:g}' for one in MARGINS.tolist())} times the largest velocity, acceleration and jerk "
+    "of the log; replace them by your drive's, and take out estimated = true, before a compensator moves it"
+)
+
+
+def drive_limits(given: Mapping[str, float]) -> dict[str, float]:
+    """Return the entries of ``[drive_limits]`` of options by their names; empty without any.
+
+    What of the others is left out follows from the log. ParameterError if some of the three limits are missing.
+    """
+    found = {entry: one.checked(given[one.name]) for entry, one in DRIVE_LIMIT_ENTRIES.items() if one.name in given}
+    names = [parameter.name for parameter in Limits.parameters().values()]
+    if found and (left := [name for name in names if name not in given]):
+        raise ParameterError(f"a compensator needs the drive's limits {', '.join(names)}; missing: {', '.join(left)}")
+    return found
+
+
+def held_for(x_d: Array) -> int:
+    """Return for how many samples each command is held, or rounded to the same."""
+    intervals = np.diff(np.flatnonzero(np.diff(x_d)))
+    return int(np.quantile(intervals, _HELD)) if len(intervals) > STEPS else 1
+
+
+def rounding_of(x_d: Array) -> float:
+    """Return the step to which commands are rounded, m.
+
+    Rounding is white noise where they move, but not at every speed, and no more than their smallest change.
+    """
+    rough = np.abs(np.diff(x_d, 5))[x_d[5:] != x_d[:-5]]
+    noise = float(np.quantile(rough, 0.9)) / (1.645 * math.sqrt(252.0)) if len(rough) else 0.0
+    return min(resolution(x_d), math.sqrt(12.0) * noise)
+
+
+def _motion(x_d: Array, T_s: float) -> list[float]:
+    """Return the largest velocity, acceleration and jerk of commands, ``(n,)``, without what holds and rounds them.
+
+    Differences are over as many samples as a command is held for, and as make its rounding small against them.
+    """
+    held = held_for(x_d)
+    x_d, T_s = x_d[::held], held * T_s
+    rounding, found = rounding_of(x_d), []
+    for order in (1, 2, 3):
+        sizes = {n: largest(np.diff(x_d[: len(x_d) // n * n].reshape(-1, n), order, axis=0)) for n in _OVER}
+        n = next((n for n, size in sizes.items() if 2 ** (order - 1) * rounding <= _ROUNDING * size), 1)
+        found.append(sizes[n] / (n * T_s) ** order)
+    return found
+
+
+def _largest_error(error: Array) -> float:
+    """Return the largest servo error of a log, ``(n,)``, m: about its median where that is an offset."""
+    median = float(np.nanmedian(error))
+    varies = np.abs(error - median)
+    is_offset = 0.0 < _ZERO * float(np.nanquantile(varies, _VARIES)) < abs(median)
+    return float(np.nanmax(varies if is_offset else np.abs(error)))
+
+
+def largest_motion(recordings: Sequence[Recording], T_s: float) -> tuple[Array, float]:
+    """Return the largest velocity, acceleration and jerk of the commands, ``(3,)``, and the largest servo error, m."""
+    peaks = np.array([_motion(one.x_d, T_s) for one in recordings]).reshape(-1, 3).max(axis=0, initial=0.0)
+    measured = [error for error in (one.x_d - one.x for one in recordings) if np.isfinite(error).any()]
+    return peaks, max(map(_largest_error, measured), default=0.0)
+
+
+def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, Any]:
+    """Return entries of ``[drive_limits]`` from the motion of the commands, marked as estimates; empty without motion.
+
+    They are :data:`MARGINS` times the largest velocity, acceleration and jerk; the command may change by twice the
+    largest servo error, and the compensator trips above :data:`FOLLOWING_ERROR` times it.
+    """
+    peaks, error = largest_motion(recordings, T_s)
+    bounds = (*(MARGINS * peaks).tolist(), 2.0 * error, FOLLOWING_ERROR * error)
+    values = list(zip(DRIVE_LIMIT_ENTRIES.items(), bounds, strict=True))
+    if not all(value >= (one.minimum or one.nonzero) for (_, one), value in values):
+        return {}
+    return {**{name: min(float(f"{value:.4g}"), one.maximum) for (name, one), value in values}, "estimated": True}
