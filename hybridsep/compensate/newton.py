@@ -241,8 +241,8 @@ FIRST_REACH, _LEAST_REACH, _REACH, _WIDER, _MOST_REACH = 0.1, 0.03, 0.5, 2.0, 1.
 """Half of the change of velocity that friction's slope is taken over: relative to the model's velocity scale, in the
 first step of a run and at least; and relative to what the last step has changed of the velocity, or would have (RMS). A
 slope over less is blind to a sign that changes nearby, and no way down; one over more sees signs that stay. So where no
-length of a step lowers the cost the next one, in the next window, looks farther by a factor, up to the most: over the
-same change it would be the same step."""
+length of a step lowers the cost the next one looks farther by a factor, up to the most: over the same change it would
+be the same step."""
 
 TWICE, THRICE = 15, 5
 """Samples that a plan has from which on it makes two Newton steps, and windows in a plan below which it makes three: a

@@ -310,12 +310,11 @@ class AveragedPlanning(Planning):
             last = planner.point(previous_plan, prediction=model.of_previous_plan)
             of_physics, reach = planner.point(physics), None
             if follows:
-                hybrid, reach, steps = last, self.reach, self.n_steps
-                while steps > 0:
-                    start, before = hybrid, replace(preview, previous_plan=hybrid.coefficients)
+                hybrid, reach = last, self.reach
+                for _ in range(self.n_steps):
+                    before = replace(preview, previous_plan=hybrid.coefficients)
                     bounds = self.limits(before, turns=self.n_turning, change=change)
-                    hybrid, reach = planner.step(start, bounds, self.basis.filtered(g), reach)
-                    steps = steps - 1 if hybrid is not start else 0  # where it gains nothing the next window goes on
+                    hybrid, reach = planner.step(hybrid, bounds, self.basis.filtered(g), reach)
                 if is_better(hybrid.cost, of_physics.cost):
                     step, gain = hybrid.coefficients - previous_plan, last.cost - hybrid.cost
                     share = self._share_of(step)

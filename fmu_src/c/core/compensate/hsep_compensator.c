@@ -357,9 +357,8 @@ HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead
 HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensator_outputs *outputs)
 {
     const hsep_predictor *predictor = hsep_part_const(self, self->predictor);
-    const hsep_planner *planner = hsep_part_const(self, self->planner);
     const hsep_int i = predictor->k % predictor->Np;
-    const int follows = self->averaged && i < hsep_planner_pinned(planner);
+    const int follows = self->averaged && i < hsep_planner_pinned(hsep_part_const(self, self->planner));
     hsep_predictor_read(predictor, &outputs->predicted);
     if (!self->averaged && self->state != HSEP_SEP_HYBRID) {
         outputs->predicted.x_h_std = 0.0; /* of x_pb it is not known */

@@ -99,8 +99,7 @@ static hsep_real newton_cost(hsep_newton *self, const hsep_newton_task *task, co
 /* Variance of the plan that was predicted last with variances, over all of it, weighted as its errors, m2. */
 static hsep_real newton_doubt(hsep_newton *self, const hsep_newton_task *task)
 {
-    const hsep_real *weight = hsep_at(self, self->weight);
-    const hsep_real *variance = hsep_at_const(task->model, task->model->variance);
+    const hsep_real *weight = hsep_at(self, self->weight), *variance = hsep_at(task->model, task->model->variance);
     hsep_real sum = 0.0;
     for (hsep_int k = 0; k < self->preview; k++) {
         sum += weight[k] * weight[k] * variance[self->preview - 1 - k];
@@ -229,12 +228,11 @@ HSEP_API void hsep_newton_init(
  * the best plan, or would, RMS, relative to the model's scale. */
 static hsep_real newton_next_reach(hsep_newton *self, const hsep_newton_task *task)
 {
-    const hsep_real *c = hsep_planner_coefficients(task->planner), *best = hsep_at(self, self->best);
     const hsep_real scale = task->model->forecast_scale * hsep_averaged_disturbances(task->model)->T_s;
     const hsep_int n = HSEP_N_DECIDED + self->n;
     hsep_real *change = hsep_at(self, self->target), last = 0.0, squares = 0.0;
-    newton_copy(self, change, c);
-    hsep_axpy(change, -1.0, best, n);
+    newton_copy(self, change, hsep_planner_coefficients(task->planner));
+    hsep_axpy(change, -1.0, hsep_at(self, self->best), n);
     for (hsep_int k = 0; k < self->preview; k++) {
         const hsep_real delta = hsep_splines_sum(hsep_planner_splines(task->planner), change, n, k);
         squares += (delta - last) * (delta - last);
@@ -454,10 +452,14 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
             NEWTON_SOLVE(6, 7, planner->steps);
         }
 
-        /* Newton steps, the first from the remainder of the last plan, each from the one before as long as they gain */
+        /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
         newton_copy(self, hsep_at(self, self->best), rest);
         self->gains = 1;
-        for (self->steps = 0; self->follows && self->gains && self->steps < self->n_steps; self->steps++) {
+        for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
+            if (!self->gains) { /* what was predicted last was no better */
+                self->left += 2 * NEWTON_PREDICTION;
+                NEWTON_PREDICT(8, 9, hsep_at(self, self->best));
+            }
             NEWTON_YIELD(10, NEWTON_SOME);
             newton_copy(self, c, hsep_at(self, self->best));
             hsep_planner_open(planner, task->x_d, self->preview - straight, self->bound); /* it follows the friction */
@@ -540,12 +542,11 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
     hsep_averaged_forecast(
         task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
         hsep_at(self, self->e_h), self->samples);
-    const hsep_int was_planned = self->planned;
+    self->ends = best == 0 && self->planned > 0;
     self->planned = best > 0;
     self->is_physics = best == 1;
     self->judges = self->planned && (hsep_real)predictor->k >= predictor->n_init && task->model->predicted[HSEP_STATIC];
     self->follows = self->judges && best > 1;
-    self->ends = best == 0 && was_planned > 0;
     /* This sample has begun, and learned the last window */
     self->next = 4 * NEWTON_PASS + NEWTON_SOME * newton_parts(self->samples, HSEP_NEWTON_VARIED);
     self->left = self->next + newton_of_plan(self, task, self->samples);
