@@ -84,7 +84,7 @@ FINDINGS: Mapping[str, Explanation] = {
         "Name the column of the measured position with `--x`.",
     ),
     "wraps": Explanation(
-        "The measured position jumps by all that it reaches and goes on: a counter or a modulo axis begins anew.",
+        "A position jumps by 2¹⁶ of its smallest steps, and goes on after the jump as before it: a counter wraps.",
         "Unwrap it before, as by `numpy.unwrap(x, period=...)` with the message's period, or record it with more bits.",
     ),
     "unit": Explanation(

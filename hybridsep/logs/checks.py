@@ -46,7 +46,7 @@ _TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
 """Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit."""
 
 _START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
-_WRAP = 0.8  # share of the travel that the jump of a counter has
+_COUNTS, _IN_A_SAMPLE, _WHOLE = 2**16, 0.1, 1e-2  # of a counter: range, motion in a sample relative to it, rounding
 
 _USUAL = 0.98  # quantile of what is usual, beyond which are the samples that are looked for
 
@@ -146,22 +146,21 @@ def _hopeless(log: Log) -> Iterator[Finding]:
 
 
 def _wraps(log: Log) -> Iterator[Finding]:
-    """Find measured positions that jump by all that they reach, against the command's motion, and go on as before."""
-    steps = np.diff([log.x_d, log.x_meas], prepend=0.0)
-    steps[:, log.starts] = 0.0
-    travels = _travel(log.x_d), _travel(log.x_meas)
-    anew, far = (np.abs(one) > _WRAP * travel for one, travel in zip(steps, travels, strict=True))
-    moves = np.convolve(np.where(anew, 0.0, steps[0]), np.ones(5) / 5, "same")
-    at = np.flatnonzero(far & (moves != 0.0))  # at rest noise jumps to and fro
-    if not len(at) or np.nanmax(np.abs(steps[1, ~far])) > (1.0 - _WRAP) * travels[1]:
-        return
-    if np.mean(steps[1, at] * moves[at] < 0.0) > _WRAP:
-        period = float(np.median(np.abs(steps[1, at] - moves[at])))
-        words = (
-            f"the measured position jumps by all that it reaches, in {len(at)} samples, and goes on: a counter or an "
-            f"axis that begins anew; unwrap it before, with its period, about {log.shown.words(period)}"
-        )
-        yield Finding("wraps", words, {"n": float(len(at)), "period": period}, refused=True)
+    """Find positions that jump by all that a counter counts, and go on after the jump as before it."""
+    for name, column in (("commanded", "x_d"), ("measured", "x_meas")):
+        signals = [getattr(one, column) for one in log.segments()]
+        x, jumps = np.concatenate(signals), np.concatenate([np.diff(one) for one in signals])
+        step = resolution(x)
+        counts = np.abs(jumps[np.isfinite(jumps)]) / step
+        beside = np.abs(counts - _COUNTS)
+        wraps, others = beside < _IN_A_SAMPLE * _COUNTS, counts[beside >= _IN_A_SAMPLE * _COUNTS]
+        is_counter = _travel(x) < _COUNTS * step and (np.abs(counts - np.round(counts)) < _WHOLE).all()
+        if wraps.any() and is_counter and beside[wraps].max() <= 2.0 * others.max(initial=0.0):
+            words = (
+                f"the {name} position jumps by {_COUNTS} of its smallest steps, in {wraps.sum()} samples: a counter of "
+                f"16 bits wraps; unwrap it before, with a period of {log.shown.words(_COUNTS * step, '.6g')}"
+            )
+            yield Finding("wraps", words, {"n": float(wraps.sum())}, refused=True)
 
 
 def _unit(log: Log) -> Iterator[Finding]:

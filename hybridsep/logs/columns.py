@@ -4,7 +4,7 @@ import re
 import shlex
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,6 +80,9 @@ def choose_columns(
         if source.names.count(name) > 1:
             raise LogError(f"{source.path}: column {brief(name)} must occur once, got {source.names.count(name)}")
         found[role] = _time(source, name) if role == "t" else _position(source, name, unit, sign * (role == told))
+    if told and not found[told].stated:  # an error is in the unit of the position beside it
+        beside = found["x" if told == "x_d" else "x_d"]
+        found[told] = replace(found[told], unit=beside.unit, stated=beside.stated)
     x_d, x = found["x_d"], found["x"]
     if x_d.unit.si != x.unit.si:
         units = f"{brief(x_d.name)} is in {x_d.unit.name} and column {brief(x.name)} in {x.unit.name}"

@@ -228,7 +228,8 @@ OF_TOOLS = (
     "Z_ref | Z_act | Z_nominal; reference_position | position | estimated_position; q_des({}) | q({}) @ 1; "
     "q_des[{}] | q[{}] @ 1; x_d({}) | x({}) @ 1; q_d[{}] | q[{}] | dq[{}] @ 2; _RPX | _TPX | _TEX; "
     "TPOS | APOS | POSERR; RPOS(X) | FPOS(X) | APOS(X) | TPOS(X); DPOS AXIS(0) | MPOS AXIS(0) | FE AXIS(0); "
-    "goal_position | present_position | present_velocity"
+    "goal_position | present_position | present_velocity; SetPos | ActPos | TargetPos; "
+    "RPOS | FPOS | DPOS | MPOS"
 )
 """Commanded and measured position, then others, as controllers, drives and recorders call them; and the axis."""
 

@@ -326,7 +326,7 @@ class AveragedModel:
         state = _with_scales(self, forecast, max(self.learned.fastest, fastest))
         learned, measured = state.learned, x - window.x_pb
         largest, T_s = learned.scales[MODEL_RESIDUAL].largest, self.settings.T_s
-        accepted, gate = gated(run.gate, x, window.x_pb, largest, learned.fastest, T_s)
+        accepted, gate = gated(run.gate, measured, largest, max(learned.fastest, learned.velocity_scale * T_s), T_s)
         e = _bridged(forecast.e_h[:m], measured, accepted)
         e_0 = e + window.x_pb - self.static.command.late(run.static.x_d, window.x_d)
         x, velocity = window.x_pb + e, learned.velocity_scale

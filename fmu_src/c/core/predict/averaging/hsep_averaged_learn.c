@@ -43,7 +43,8 @@ static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], co
     learned->largest_step = self->forecast_step;
     learned->fastest = hsep_fmax(learned->fastest, hsep_fmax(first, hsep_largest_step(x_pb, self->Np)));
     hsep_copy(hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), self->n_static);
-    hsep_gate_begin(&self->reach, learned->scales[HSEP_MODEL_RESIDUAL].largest, learned->fastest);
+    const hsep_real fastest = hsep_fmax(learned->fastest, learned->velocity_scale * self->T_s);
+    hsep_gate_begin(&self->reach, learned->scales[HSEP_MODEL_RESIDUAL].largest, fastest);
     hsep_command_take(command, x_d, self->Np);
     if (self->n > self->Np) { /* what was tried last went beyond the window */
         const hsep_real *late = hsep_command_late(command, self->Np);
@@ -190,11 +191,11 @@ static void averaged_bridge(const hsep_averaged *self, hsep_real e[], hsep_int b
 static void averaged_follow_sample(hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], int fold)
 {
     const hsep_int k = self->followed++, j = self->Np - 1 - k;
-    const hsep_real measured = hsep_at(self, self->measured)[j];
-    const int accepted = hsep_gate_judge(&self->reach, measured, x_pb[j], self->T_s);
+    const hsep_real measured = hsep_at(self, self->measured)[j] - x_pb[j];
+    const int accepted = hsep_gate_judge(&self->reach, measured, self->T_s);
     hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
     if (accepted) {
-        e[j] = measured - x_pb[j];
+        e[j] = measured;
         averaged_bridge(self, e, j + 1);
         averaged_take_rows(self, x_pb, e, k + 1);
         self->n_accepted += 1.0;

@@ -10,13 +10,11 @@ typedef struct {
     hsep_int n_missing; /* samples since the last one that was believed, */
     hsep_int n_beyond;  /* of these, values out of reach, less values within reach that followed */
     hsep_real farthest; /* m, largest residual out of reach among them */
-    hsep_real last;     /* m, last measured position of the run; 0: none yet */
-    hsep_real finest;   /* m, the least change of it from sample to sample that is one; 0: none yet */
     hsep_real largest;  /* m, largest residual believed */
     hsep_real fastest;  /* m, largest change of x_pb from sample to sample so far, of the window, too */
     hsep_int known;     /* whether there was a motion, and a residual, before the window */
 } hsep_gate;
-HSEP_ASSERT_WORDS(hsep_gate, 8);
+HSEP_ASSERT_WORDS(hsep_gate, 6);
 
 /* Begin a window. largest: m, the largest residual believed before it; fastest: m. */
 static inline void hsep_gate_begin(hsep_gate *self, hsep_real largest, hsep_real fastest)
@@ -26,20 +24,16 @@ static inline void hsep_gate_begin(hsep_gate *self, hsep_real largest, hsep_real
     self->known = largest > 0.0 && fastest > 0.0;
 }
 
-/* Judge its next sample, x, m, NaN where it is missing; return whether it is believed. Before the first motion, and
- * over the first window that has a residual, all are. x_pb: m, the physics model's; T_s: s. Constant cost. */
-static inline int hsep_gate_judge(hsep_gate *self, hsep_real x, hsep_real x_pb, hsep_real T_s)
+/* Judge its next sample by its residual e, m, NaN where it is missing; return whether it is believed. Before the first
+ * motion, and over the first window that has a residual, all are. T_s: s. Constant cost. */
+static inline int hsep_gate_judge(hsep_gate *self, hsep_real e, hsep_real T_s)
 {
-    const hsep_real size = hsep_fabs(x - x_pb), change = self->last != 0.0 ? hsep_fabs(x - self->last) : 0.0;
+    const hsep_real size = hsep_fabs(e), most = HSEP_AVERAGING_GATE * (self->largest + self->fastest);
     self->n_missing++;
-    if (!isfinite(x)) {
+    if (!isfinite(e)) {
         return 0;
     }
-    self->last = x;
-    if (change > 0.0 && (self->finest == 0.0 || change < self->finest)) {
-        self->finest = change;
-    }
-    if (self->known && size > HSEP_AVERAGING_GATE * (self->largest + self->fastest + self->finest)) {
+    if (self->known && size > most) {
         self->n_beyond++;
     } else if (self->n_beyond > 0) {
         self->n_beyond--;
