@@ -26,7 +26,7 @@ limits do not count it: a compensator would move the axis by as much, and nothin
 
 FOLLOWING_ERROR = 1.3
 """``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
-error below that was above it (``python -m benchmarks.faults``)."""
+error without compensation was above it (``python -m benchmarks.faults``)."""
 
 LIMITS_WORDS = (  # what the limits of :func:`estimated_limits` are
     f"estimates, {', '.join(f'{one:g}' for one in MARGINS.tolist())} times the largest velocity, acceleration and jerk "

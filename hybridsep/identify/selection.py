@@ -214,7 +214,7 @@ def with_slow_part(
     most = _HELD_OUT_WORTH * back(chosen.fit) if left else 0.0
     while left:
         candidate = _chosen_of(left)
-        of_friction = _beside_friction(chosen.fit, candidate.fit, segments, T_s)
+        of_friction, _ = _beside_friction(chosen.fit, candidate.fit, segments, T_s)
         if of_friction < _CANCELLING_WORTH and back(candidate.fit) < most:
             return replace(candidate, objection="")
         left.remove(candidate)
@@ -228,15 +228,19 @@ def second_order(chosen: Candidate, tried: Sequence[Candidate], segments: Sequen
     """
     worth = _CANCELLING_WORTH if chosen.slow_parts else _MORE_WORTH
     small = [c for c in tried if 0 < c.structure.order <= 2 < chosen.structure.order and not c.objection]
-    like = (c for c in small if _beside_friction(c.fit, chosen.fit, segments, T_s) > worth)
+    beside = ((c, *_beside_friction(c.fit, chosen.fit, segments, T_s)) for c in small)
+    # poles that are not slow beside the others are the drive's where friction explains none of what they do
+    rubs = 1.0 if chosen.slow_parts else _MORE_WORTH
+    like = (c for c, of_friction, left in beside if of_friction > worth and left <= rubs)
     found = (without_long_delay(c, segments, T_s) for c in like)  # a lag's dead time may stand for a pole
     return next((second for second in found if second.structure.order == 2), chosen)
 
 
-def _beside_friction(fit: Fit, other: Fit, segments: Sequence[Segment], T_s: float) -> float:
+def _beside_friction(fit: Fit, other: Fit, segments: Sequence[Segment], T_s: float) -> tuple[float, float]:
     """Return the ratio of the errors that friction leaves with and without what another fit has more than a fit.
 
-    Friction is the command's sign, and what follows it at rates from the other's slowest one on.
+    Friction is the command's sign, and what follows it at rates from the other's slowest one on. Returns also what it
+    leaves of the fit's error.
     """
     rates, errors = other.structure.slowest_rate(other.theta) * _CREEPS ** np.arange(4.0), []
     for s in segments:
@@ -244,9 +248,10 @@ def _beside_friction(fit: Fit, other: Fit, segments: Sequence[Segment], T_s: flo
         late = [lfilter([1.0 - kept], [1.0, -kept], sign) for kept in np.exp(-rates * T_s)]
         friction, more = np.stack((np.ones(len(x)), sign, *late)).T[s.known], simulated(other, s, T_s) - x
         both = without(friction, np.stack((s.y - x, more)).T[s.known])
-        errors.append((both[:, 0], without(both[:, 1:], both[:, :1])[:, 0]))
-    of_friction, of_both = (np.concatenate(one) for one in zip(*errors, strict=True))
-    return float(np.linalg.norm(of_both) / np.linalg.norm(of_friction))
+        error = (s.y - x)[s.known]
+        errors.append((error - error.mean(), both[:, 0], without(both[:, 1:], both[:, :1])[:, 0]))
+    alone, of_friction, of_both = (np.linalg.norm(np.concatenate(one)) for one in zip(*errors, strict=True))
+    return float(of_both / of_friction), float(of_friction / alone)
 
 
 def well_damped(chosen: Candidate, segments: Sequence[Segment], T_s: float) -> Candidate:

@@ -7,8 +7,9 @@ import pytest
 from identification_cases import T_S, correlated, measured, moves
 from places import EMPS, RECORDINGS
 from scipy import io
+from scipy.signal import lfilter
 
-from hybridsep import ModalModel, Mode
+from hybridsep import Limits, ModalModel, Mode, rest_to_rest
 from hybridsep.base.errors import IdentificationError
 from hybridsep.base.signals import Array
 from hybridsep.identify.model import IdentifiedModel
@@ -68,6 +69,19 @@ def test_an_arm_that_sags_or_rubs_has_poles_not_a_dead_time(sag: float, friction
     assert found.model.dead_time <= 2
     assert value(found, "mode[1].f_n")[0] == pytest.approx(3.56, rel=0.2)
     assert value(found, "mode[1].zeta")[0] == pytest.approx(0.56, rel=0.2 if sag else 0.8)
+
+
+@pytest.mark.slow
+def test_poles_that_friction_does_not_explain_are_the_drives() -> None:
+    """A mode and a lag without friction: a second order leaves a twentieth more than noise, and is another one."""
+    targets, starts = np.random.default_rng(9).uniform(-0.004, 0.004, 16).tolist(), 0.3 + 0.75 * np.arange(16)
+    x_d = rest_to_rest([0.0, *targets], Limits(0.1, 0.5, 10.0), T_S, start_times=starts.tolist(), duration=12.3)
+    discrete = ModalModel([Mode(20.0, 0.5, (40 * np.pi) ** 2)]).discretise(T_S)
+    lag = np.exp(-16 * np.pi * T_S)
+    x = lfilter([0.0, 1.0 - lag], [1.0, -lag], discrete.forced_response(discrete.rest(), x_d)[0])
+    found = identify_operation([(x_d, x + np.random.default_rng(1).normal(0.0, 1e-6, len(x)))], T_S)
+    assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.05)
+    assert value(found, "mode[1].zeta")[0] == pytest.approx(0.5, rel=0.1)
 
 
 @pytest.mark.slow
