@@ -174,7 +174,7 @@ class TextSource(Source):
         """Return the command with what is blank as before, which is noted; LogError if it is where x is measured."""
         blank, name = column == _BLANK, brief(self.commanded)
         missing = np.isnan(measured) if measured is not None else np.zeros_like(blank)
-        if blank.any() and min((blank != missing).mean(), missing[~blank].mean() if not blank.all() else 0.0) > _APART:
+        if blank.any() and (blank != missing).mean() > _APART and missing[~blank].sum() > _APART * (~blank).sum():
             raise LogError(
                 f"{self.path}: rows have either {name} or {brief(self.measured)}: channels with times of their own; "
                 "export them with a common time, or fill the gaps, as interpolate() of pandas does"

@@ -1,9 +1,9 @@
 """Innovation gate: a measurement is believed, unless the axis cannot have got there.
 
 The residual of an axis grows from sample to sample by no more than the axis and its model move. A value whose residual
-is beyond twice the largest so far, by more than a few of the fastest steps of the model, is missing. So are the values
-after it, until as many within reach have followed as there were beyond it: an axis passes by the zero that its sensor
-reads. After a second the axis has been moved, or its sensor set, and the value is believed.
+is beyond twice the largest so far, by more than a few of the fastest steps of model or commands, is missing. So are
+those after it, until as many within reach have followed as there were beyond it: an axis passes by the zero that its
+sensor reads. After a second the axis has been moved, or its sensor set, and the value is believed.
 """
 
 import math
@@ -33,7 +33,7 @@ def gated(
     Before the first motion, and over the first window that has a residual, all are.
 
     ``e``, (n,), m: measured residuals, NaN where missing; ``largest``, m: largest residual believed before them;
-    ``fastest``, m: largest change of ``x_pb`` from sample to sample so far, of the window, too; ``T_s``, s.
+    ``fastest``, m: largest change from sample to sample, of ``x_pb`` so far or of commands that are known; ``T_s``, s.
     """
     known = largest > 0.0 and fastest > 0.0
     believed, n_missing, n_beyond, farthest = np.isfinite(e), gate.n_missing, gate.n_beyond, gate.farthest

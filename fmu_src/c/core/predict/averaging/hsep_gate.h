@@ -11,7 +11,7 @@ typedef struct {
     hsep_int n_beyond;  /* of these, values out of reach, less values within reach that followed */
     hsep_real farthest; /* m, largest residual out of reach among them */
     hsep_real largest;  /* m, largest residual believed */
-    hsep_real fastest;  /* m, largest change of x_pb from sample to sample so far, of the window, too */
+    hsep_real fastest;  /* m, largest change from sample to sample, of x_pb so far or of commands that are known */
     hsep_int known;     /* whether there was a motion, and a residual, before the window */
 } hsep_gate;
 HSEP_ASSERT_WORDS(hsep_gate, 6);
