@@ -270,8 +270,10 @@ class AveragedModel:
         of_physics = of_physics or self.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, of_physics.rows, {}, recalled)
         if STATIC in solved:
-            # The stiffness acts at the position, which the physics model by itself does not give well enough.
-            x = x + STATIC.predict(at, held.get(STATIC), None).e_h
+            # The stiffness acts at the position, which the physics model by itself does not give well enough. Both
+            # predictions are shrunk alike, so that other commands have the same model.
+            at_first = STATIC.predict(at, held.get(STATIC), counts)
+            x, held = x + at_first.e_h, {**held, STATIC: at_first}
             at = replace(at, rows=self.static.rows(self.run.static, window, x, scales.velocity, of_physics).rows)
         predictions = {one: one.predict(at, held.get(one), counts) for one in solved}
         at, stacked = replace(at, predictions=predictions), np.empty((len(EXPERTS), len(x)))
