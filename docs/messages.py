@@ -147,12 +147,12 @@ FINDINGS: Mapping[str, Explanation] = {
         "Look at the positions in the report. An axis that sticks needs none.",
     ),
     "clipped": Explanation(
-        "The same, at one end of the measured range: the recorder's range may end there, or friction or load stops the "
-        "axis.",
+        "The measured position stands still at one end of its range while its command goes on: the recorder's range "
+        "may end there, or friction or load stops the axis.",
         "Look at the positions in the report. Record with a larger range where it was the recorder.",
     ),
     "late": Explanation(
-        "The measured position is more than 0.1 s behind its command, drive, dead time and recorder together.",
+        "The measured position lags its command by more than 0.1 s in all: drive, dead time and recorder.",
         "None, if the axis is as slow. Where the recorder is known to be late by whole samples, give `--delay`; where "
         "the controller gets the measurement as late, `--measurement_delay`.",
     ),

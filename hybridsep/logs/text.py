@@ -2,7 +2,7 @@
 
 The first lines tell the table: what delimits its fields, where its numbers begin, and which line above them has the
 names. Below, a line without any number (an ``overrun``, names that are written again) is left out and counted; what is
-left must have the table's columns. Of clock timestamps the time of day counts; dates and zones are passed over.
+left must have the table's columns. Of clock timestamps the time of day counts; dates and zones are ignored.
 """
 
 import codecs

@@ -79,7 +79,7 @@ class AveragingConstants:
     # time in which a recalled residual loses that it was moved to the last one, in windows: without an end, drives that
     # are repeated have to 7 times the error
     recall_fade: float = 0.5
-    # repeats, behind a compensator, from which on one more changes the memory of a part by a share: without, what the
+    # repeats, under a compensator, from which on one more changes the memory of a part by a share: without, what the
     # physics model has wrong grows from pass to pass, and the tenth of a belt axis has 1.3 times the error
     recall_repeats: float = 3.5
     recall_share: float = 0.7

@@ -115,7 +115,7 @@ class StaticRows(NamedTuple):
     """Features of a window."""
 
     rows: Array  # (n, n_static)
-    after: StaticState  # the state behind it
+    after: StaticState  # the state after it
     # (n, n_disturbances) and (n, N_STOPS), m: before they are filtered, and the stop operators
     disturbances: Array
     stops: Array

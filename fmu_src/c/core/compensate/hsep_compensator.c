@@ -297,8 +297,8 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
 }
 
-/* Count errors behind the command, m, that are missing (NaN), or too large, by themselves or in the mean with the one
- * behind the changed command; return whether all is well, and may be learned: online/monitor.py, which says why. */
+/* Count following errors, m, that are missing (NaN), or too large, by themselves or in the mean with the error from the
+ * modified command; return whether all is well, and may be learned: online/monitor.py, which says why. */
 static int compensator_monitor(hsep_compensator *self, hsep_real error, hsep_real change)
 {
     if (isnan(error)) {

@@ -110,7 +110,7 @@ static hsep_real newton_doubt(hsep_newton *self, const hsep_newton_task *task)
 /* Samples that the splines begin with, which are solved for. */
 static hsep_int *newton_begins(hsep_newton *self) { return hsep_part(self, self->begins); }
 
-/* A spline with this distance of knots, or it behind G_pb, (preview,), of shapes or passed. */
+/* A spline with this distance of knots, or filtered by G_pb, (preview,), of shapes or passed. */
 static hsep_real *newton_level(hsep_newton *self, hsep_int of, hsep_int level)
 {
     return hsep_at(self, of) + level * self->preview;
@@ -204,7 +204,7 @@ HSEP_API void hsep_newton_init(
         const hsep_real left = (hsep_real)(preview - k) / (hsep_real)(preview - full + 1);
         weight[k] = k < full ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
     }
-    for (hsep_int i = 0; i < self->m; i++) { /* splines of each distance of knots, and W with the physics model alone */
+    for (hsep_int i = 0; i < self->m; i++) { /* splines of each distance of knots, and W with only the physics model */
         const hsep_knot knot = hsep_knots_at(&plans->knots, i);
         const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
         hsep_real *shape = newton_level(self, self->shapes, knot.level),
@@ -301,7 +301,7 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
-/* What parts of a plan count as: columns abreast by an expert; some variances, or those behind the window, which take
+/* What parts of a plan count as: columns abreast by an expert; some variances, or those after the window, which take
  * more samples; what passes through the model or the solver once, for all samples of a plan; and half a prediction of a
  * plan, the slopes under it, or the jerk of a programme. */
 #define NEWTON_COLUMNS 3
@@ -362,7 +362,7 @@ static void newton_predict(
     self->samples = last;
 }
 
-/* Predict the next ones with variances, one for each sample in the window, and one for some behind it. */
+/* Predict the next ones with variances, one for each sample in the window, and one for some after it. */
 static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[])
 {
     const hsep_int window = self->late + self->Np, apart = self->samples < window ? 1 : HSEP_NEWTON_APART;
@@ -372,7 +372,7 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
 
 /* Cut a plan: what follows counts as so much, and is done when newton_go_on is called again; where: another one for
  * each. A switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006). */
-#define NEWTON_MADE 99 /* place behind the last yield */
+#define NEWTON_MADE 99 /* place after the last yield */
 #define NEWTON_YIELD(where, count) \
     do { \
         self->place = (where); \

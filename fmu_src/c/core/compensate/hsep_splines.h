@@ -52,8 +52,8 @@ static inline hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing)
 static inline const hsep_real *hsep_splines_shape(const hsep_splines *self) { return hsep_at_const(self, self->shape); }
 
 /* Knots of the splines that a plan is solved for: sums of the uniform ones, which it changes the last plan by. In the
- * first two windows, in which a plan acts or is pinned next, these are uniform splines themselves; behind them knots
- * are twice, and behind four windows four times as far apart. What is planned there is planned again, with closer
+ * first two windows, in which a plan acts or is pinned next, these are uniform splines themselves; after them knots
+ * are twice, and after four windows four times as far apart. What is planned there is planned again, with closer
  * knots, before it acts, and goes on as it is until then. A spline is a sum of those with half its knot interval. */
 #define HSEP_KNOTS_LEVELS 3 /* of the distance between knots: 1, 2, 4 spacings */
 #define HSEP_KNOTS_NEAR 5   /* uniform splines on each side whose rows overlap those of one, at most */
@@ -267,7 +267,7 @@ static inline hsep_real hsep_splines_energy(const hsep_splines *self)
     return sum;
 }
 
-/* The triangle of n rows := W' W of the splines behind a filter, W's columns being the filtered spline, (preview,),
+/* The triangle of n rows := W' W of the filtered splines, W's columns being the filtered spline, (preview,),
  * each shifted by one spacing more. Each diagonal is a running sum. */
 static inline void hsep_splines_filtered_gram(
     const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[])
@@ -310,7 +310,7 @@ static inline hsep_knot hsep_knots_at(const hsep_knots *self, hsep_int i)
         .share = knots_shares + knots_places[level]};
 }
 
-/* n uniform splines, of which so many begin in a window; 0: each is solved for. */
+/* n uniform splines, and how many of them begin in a window; 0: each is solved for. */
 static inline hsep_knots hsep_knots_of(hsep_int n, hsep_int window)
 {
     const hsep_int wide = window > 4 ? window : 4;
