@@ -38,7 +38,7 @@ _OWN_REACH = 1e-3
 """Change of velocity, relative to the velocity scale, that slopes of the user's own disturbances are taken over where
 the friction's is the tangent."""
 
-_APART = 4  # samples after the window that share the variance of the first one's features
+_VARIANCE_STRIDE = 4  # samples after the window that share the variance of the first one's features
 
 
 class DisturbanceSlopes(NamedTuple):
@@ -92,12 +92,12 @@ class PlanModel:
         window = self._window(x_d)
         self.scales, of_physics = model.scales_of(window)
         self._solved = model.solved(self.scales)
-        counts = np.arange(len(late) + len(x_d))
-        beyond = counts[len(late) + model.settings.Np :]
-        beyond -= np.arange(len(beyond)) % _APART
+        rows = np.arange(len(late) + len(x_d))
+        beyond = rows[len(late) + model.settings.Np :]
+        beyond -= np.arange(len(beyond)) % _VARIANCE_STRIDE
         # Prediction under ``x_d``, whose variances all others have.
         self.of_previous_plan = model.forecast_by(
-            *(self._solved, window, self.scales), counts=counts, of_physics=of_physics
+            *(self._solved, window, self.scales), variance_rows=rows, of_physics=of_physics
         )
 
     def _window(self, x_d: Array) -> ResidualWindow:

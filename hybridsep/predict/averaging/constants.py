@@ -32,7 +32,7 @@ class AveragingConstants:
     # samples by which the command may act before the physics model's dead time is over, or half of the dead time, if
     # that is more: where it is two samples too long, which no weight can mend, a warm drive leaves 1.7 times the error
     # of no compensation instead of 0.25
-    early: int = 2
+    dead_time_margin: int = 2
     # bound on the least variance of the noise relative to the largest mean square of a window: a larger ``lambda``
     # would prevent any learning
     least_noise: float = 1e-6

@@ -38,7 +38,7 @@ class CommandFeatures:
     @classmethod
     def of(cls, dead_time: int) -> "CommandFeatures":
         """Return the features for a physics model's dead time, samples: half of it may be wrong."""
-        return cls(max(dead_time - max(CONSTANTS.early, dead_time // 2), 0))
+        return cls(max(dead_time - max(CONSTANTS.dead_time_margin, dead_time // 2), 0))
 
     @property
     def p(self) -> int:
