@@ -1,4 +1,4 @@
-"""``fit`` without what takes most of its time, for tests of other things."""
+"""``fit``, and the building of FMUs, without what takes most of their time, for tests of other things."""
 
 import pytest
 
@@ -15,3 +15,9 @@ def without_other_settings(patch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` try only the default settings: a fifth of its time."""
     patch.setattr("hybridsep.fitting.choice._SHARES", ())
     patch.setattr("hybridsep.fitting.choice._Q", ())
+
+
+def with_short_references(patch: pytest.MonkeyPatch) -> None:
+    """Let FMUs that are built have reference runs of 30 samples: most of the time of a SepCompensator."""
+    for name in ("_SAMPLES", "_COMPENSATED_SAMPLES", "_SAMPLES_MAX"):
+        patch.setattr(f"hybridsep.fmi.reference.{name}", 30)
