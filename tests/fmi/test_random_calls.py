@@ -66,9 +66,8 @@ def test_random_calls_under_sanitizers(
         return folder
 
     with ThreadPoolExecutor(len(models)) as pool:
-        folders_built = [str(folder) for folder in pool.map(built, models)]
-    options = ["--seed", "1", "--seconds", *(str(factor * FUZZED[name]) for name in models)]
-    command = [sys.executable, fuzz_fmi.__file__, *folders_built, *options]
+        command = [sys.executable, fuzz_fmi.__file__, *map(str, pool.map(built, models)), "--seed", "1", "--seconds"]
+    command += [str(factor * FUZZED[name]) for name in models]
     result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stdout + result.stderr
     assert result.stdout.count("no finding") == len(models)

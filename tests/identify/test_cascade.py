@@ -106,6 +106,6 @@ def test_a_fit_of_given_gains(log: tuple[Array, Array]) -> None:
     assert said.startswith("the given gains leave ")
     assert "contradicts" not in said
     assert found.judged.replay.rms()[2] < 0.6 * found.judged.replay.rms()[0]
-    given = {**gains("X"), "Kp": 30.0, "feed_forward": 0.0}
-    wrong = hybridsep.fit(x_d[:3000], x[:3000], T_s=T_S, Np=50, cascade=given)
+    others = {"Kp": 30.0, "feed_forward": 0.0}
+    wrong = hybridsep.fit(x_d[:3000], x[:3000], T_s=T_S, Np=50, cascade=gains("X") | others)
     assert wrong.identification.findings[0].endswith(": the log contradicts them")

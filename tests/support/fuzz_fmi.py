@@ -10,7 +10,6 @@ import argparse
 import random
 import shutil
 import struct
-import sys
 import tempfile
 import time
 import zlib
@@ -342,14 +341,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     for folder, seconds in zip_longest(arguments.folders, arguments.seconds, fillvalue=arguments.seconds[-1]):
-        sys.stdout.write(f"{folder.name}: ")
-        sys.stdout.flush()
+        print(f"{folder.name}: ", end="", flush=True)
         with tempfile.TemporaryDirectory() as place:
             scratch = shutil.copytree(folder / "resources", Path(place) / "resources")
             fuzzer = Fuzzer(folder.resolve(), scratch, arguments.seed)
             fuzzer.run(seconds)
-        counts = f"{fuzzer.calls} calls, {fuzzer.refused} refused, {fuzzer.steps} steps"
-        sys.stdout.write(f"{counts}, no finding (seed {arguments.seed})\n")
+        print(f"{fuzzer.calls} calls, {fuzzer.refused} refused, {fuzzer.steps} steps, no finding")
 
 
 if __name__ == "__main__":
