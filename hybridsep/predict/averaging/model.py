@@ -272,7 +272,7 @@ class AveragedModel:
         if STATIC in solved:
             # The stiffness acts at the position, which the physics model by itself does not give well enough. Both
             # predictions are shrunk alike, so that other commands have the same model.
-            at_first = STATIC.predict(at, held.get(STATIC), counts)
+            at_first = STATIC.predict(at, held.get(STATIC), variance_rows)
             x, held = x + at_first.e_h, {**held, STATIC: at_first}
             at = replace(at, rows=self.static.rows(self.run.static, window, x, scales.velocity, of_physics).rows)
         predictions = {one: one.predict(at, held.get(one), variance_rows) for one in solved}
