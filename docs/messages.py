@@ -138,6 +138,11 @@ FINDINGS: Mapping[str, Explanation] = {
         "A run rejects what is out of reach (`averaging = true`); a fit identifies and judges with every sample: leave "
         "wrong measured positions blank in the file.",
     ),
+    "begins anew": Explanation(
+        "The measured position leaps from one end of its range to the other between two samples, as the position of a "
+        "modulo axis in mm does, or a counter of few bits. Whole turns and counters of 16 bits are recognised otherwise.",
+        "Unwrap both positions before, by the length after which they begin anew, as your controller must do too.",
+    ),
     "repeated samples": Explanation(
         "The position was sampled more slowly than the log was written, and unevenly.",
         "Record at the rate of the position's own source.",

@@ -116,7 +116,7 @@ def check(log: Log) -> tuple[Finding, ...]:
     if any(one.refused for one in found):
         return found
     notes = (*found, *_note_missing(log), *_note_rate(log), *_note_outliers(log), *_note_start(log))
-    notes += (*_note_moved_at_rest(log), *_note_held(log, given.lag_of_one if given else 0))
+    notes += (*_note_anew(log), *_note_moved_at_rest(log), *_note_held(log, given.lag_of_one if given else 0))
     return (*notes, *(_note_relation(log, x_d, x, given) if given else ()))
 
 
@@ -347,6 +347,22 @@ def _note_missing(log: Log) -> Iterator[Finding]:
             f"first is sample {missing[0] + 1}: they are left out"
         )
         yield Finding("missing samples", words, {"n": float(len(missing))})
+
+
+def _note_anew(log: Log) -> Iterator[Finding]:
+    """Note a measured position that jumps by all of its range from one sample to the next, and goes on from there."""
+    steps = np.nan_to_num(np.concatenate([np.diff(one.x_meas) for one in log.segments()]))
+    most = (1.0 - _IN_A_SAMPLE) * _travel(log.x_meas)
+    jumps = np.abs(steps) > most
+    n, turn, others = int(jumps.sum()), float(np.abs(steps).max()), np.abs(np.where(jumps, 0.0, steps))
+    way = float(np.ptp(np.cumsum(np.where(jumps, steps - np.copysign(turn, steps), steps))))
+    if n > 1 and others.max() < _IN_A_SAMPLE * most and way > turn / 2.0:
+        words = (
+            f"the measured position jumps {n} times by all of its range, {log.shown.words(turn, '.4g')}, between two "
+            "samples, and goes on from there: does it begin anew, as a modulo axis or a counter? Unwrap both positions "
+            "before; such jumps are identified and judged as motion"
+        )
+        yield Finding("begins anew", words, {"n": float(n), "range": turn})
 
 
 def moved_by_command(log: Log) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
-from .names import ROLES, axes_of, has_word, known_names, lone_position, signals_of
+from .names import ROLES, axes_of, beside_error, has_word, known_names, signals_of
 from .source import Block, Source
 from .text import is_number, stamp_kind
 from .times import COUNTED
@@ -54,7 +54,8 @@ def choose_columns(
             raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, error, got {brief(role)}")
     given = dict(columns or {})
     error = given.pop("error", None)
-    chosen, remarks = _positions(source, given, axis)
+    beside = beside_error(source.names, error) if error and axis is None and not {"x_d", "x"} & given.keys() else {}
+    chosen, remarks = ({"x_d": None, "x": None, **beside}, []) if beside else _positions(source, given, axis)
     time = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
     if time is None and "t" not in given:
         time = _only_time(source)
@@ -75,14 +76,15 @@ def choose_columns(
     found: dict[str, Column] = {}
     names = {role: name for role, name in chosen.items() if name is not None}
     if len(names) < len(chosen):
-        raise _missing(source, {role: given.get(role, role) for role in chosen if role not in names})
+        lacks = [role for role in chosen if role not in names]
+        raise _missing(source, {"error" if role == told else role: given.get(role, role) for role in lacks})
     for role, name in names.items():
         if source.names.count(name) > 1:
             raise LogError(f"{source.path}: column {brief(name)} must occur once, got {source.names.count(name)}")
         found[role] = _time(source, name) if role == "t" else _position(source, name, unit, sign * (role == told))
     if told and not found[told].stated:  # an error is in the unit of the position beside it
-        beside = found["x" if told == "x_d" else "x_d"]
-        found[told] = replace(found[told], unit=beside.unit, stated=beside.stated)
+        other = found["x" if told == "x_d" else "x_d"]
+        found[told] = replace(found[told], unit=other.unit, stated=other.stated)
     x_d, x = found["x_d"], found["x"]
     if x_d.unit.si != x.unit.si:
         units = f"{brief(x_d.name)} is in {x_d.unit.name} and column {brief(x.name)} in {x.unit.name}"
@@ -95,7 +97,7 @@ def _told_by_error(source: Source, chosen: dict[str, str | None], given: dict[st
     if {"x_d", "x"} <= given.keys():
         raise LogError(f"{source.path}: columns may name two of x_d, x and error, got all three")
     if not any(chosen.values()):
-        chosen |= lone_position(source.names)
+        chosen |= beside_error(source.names)
     told = "x" if chosen["x_d"] and "x" not in given else "x_d"
     name = _name(source, "error", error)
     sign, name = (1, name) if name else (-1, _name(source, "error", error.removeprefix("-")))
@@ -236,8 +238,8 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
     there = f"{which} missing, the file has {listed(source.names)}"
     errors, speeds = ([name for name in source.names if has_word(kind, name)] for kind in ("error", "velocity"))
     instead = "; velocities are none: record positions" if speeds and not errors and set(names) != {"t"} else ""
-    if errors and set(names) != {"t"}:
-        if {"x_d", "x"} <= names.keys() and not lone_position(source.names):
+    if errors and {"x_d", "x"} & names.keys():
+        if {"x_d", "x"} <= names.keys() and not beside_error(source.names):
             instead = "; an error alone tells neither position: record one beside it"
         else:
             instead = f"; or the error beside one position, commanded − measured: {error_option(errors[0])} (where it "

@@ -11,10 +11,10 @@ from functools import partial
 from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import LogError, ParameterError, brief, check_kind
 from ..base.settings import check
@@ -27,7 +27,20 @@ from .source import Block, Source
 from .times import NOT_LATER, Times, recorded_times
 from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated_unit
 
-Table = Any  # of pandas, polars, Arrow or xarray, or a structured array
+
+class _Frame(Protocol):
+    @property
+    def columns(self) -> Any:
+        """Names, or in Arrow columns."""
+
+
+class _Dataset(Protocol):
+    @property
+    def data_vars(self) -> Any:
+        """Variables by name."""
+
+
+Table = _Frame | _Dataset | NDArray[np.void]  # of pandas, polars or Arrow; xarray; a structured array
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,6 +294,7 @@ def check_reading(unit: str | None, T_s: float | None) -> float | None:
 # Changes --------------------------------------------------------------------------------------------------------------
 
 _TURN = 2 * math.pi
+_SAME = 1.001  # ratio of errors that rounding leaves, as where one position is made of the other and its error
 
 _ONE_PHASE, _CHANGES = 0.95, 50
 """Share of a slow sensor's changes that come in one sample of every n, which no other log of a hundred reached for any
@@ -308,7 +322,7 @@ def whole_turns(given: Log) -> tuple[Log, str]:
     x_meas[known] = np.unwrap(x_meas[known], period=_TURN)
     x_meas -= _TURN * np.round(np.median(x_meas[known] - x_d[known]) / _TURN)
     # A command may well jump by one turn: the axis then follows it through, and loses it if the jump is taken out.
-    if _error(x_d, x_meas) > _error(given.x_d, given.x_meas):
+    if _error(x_d, x_meas) > _SAME * _error(given.x_d, given.x_meas):
         return given, ""
     first = min(int(where[0]) for where in jumps if len(where))
     said = f"{n} jumps of a whole turn, the first at sample {first + 1}: both positions are unwrapped"

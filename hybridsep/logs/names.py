@@ -128,11 +128,22 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     return found
 
 
-def lone_position(names: Sequence[str]) -> dict[str, str]:
-    """Return the only commanded position by its role, or the only measured one; empty where there are none."""
+def beside_error(names: Sequence[str], error: str = "") -> dict[str, str]:
+    """Return the positions by role of the axis whose words an error's name has, without a name of the only one."""
     commanded, measured, _ = _by_words(names)
-    only = list((commanded or measured).values())
-    return {"x_d" if commanded else "x": only[0]} if len(only) == 1 else {}
+    pairs, words = axes_of(names), _words(error)
+    both = {
+        "x_d": {axis: pair[0] for axis, pair in pairs.items()},
+        "x": {axis: pair[1] for axis, pair in pairs.items()},
+    }
+    for known in (both, {"x_d": commanded, "x": measured}):
+        axes = {*known["x_d"]} or {*known["x"]}
+        if words:
+            n = {axis: len(own) for axis in {*known["x_d"], *known["x"]} if (own := _words(axis)) and own <= words}
+            axes = {axis for axis in n if n[axis] == max(n.values())}
+        if len(axes) == 1:
+            return {role: of_role[axis] for role, of_role in known.items() for axis in axes if axis in of_role}
+    return {}
 
 
 def signals_of(names: Sequence[str], measured: str) -> dict[str, str]:
@@ -159,9 +170,13 @@ def _tokens(name: str) -> list[str]:
     return _TOKEN.findall(_POS.sub(r" \1", _COLUMN.sub(r" \1", plain).replace("_", " ")))
 
 
+def _words(name: str) -> set[str]:
+    return {token.lower() for token in _tokens(name) if token.isalnum()}
+
+
 def has_word(kind: str, name: str) -> bool:
     """Return whether a name has a word of a time, a velocity or an error."""
-    return not {"t": _TIME, "velocity": _VELOCITY, "error": _ERROR}[kind].isdisjoint(map(str.lower, _tokens(name)))
+    return not {"t": _TIME, "velocity": _VELOCITY, "error": _ERROR}[kind].isdisjoint(_words(name))
 
 
 def _spelling(name: str) -> str:

@@ -15,7 +15,7 @@ from log_files import refused
 import hybridsep
 from hybridsep.base.errors import HybridSepError, LogError, ParameterError, SignalError
 from hybridsep.base.signals import as_measured, as_samples
-from hybridsep.logs.log import read_log
+from hybridsep.logs.log import Table, read_log
 from hybridsep.logs.units import stated_unit
 
 N = 3000
@@ -89,6 +89,15 @@ MISSING: Mapping[str, Any] = {
     "fields": np.array(list(zip(X_D, GAPS, strict=True)), [("x_d", "f8"), ("x", "f8")]),
     "lazy": Lazy(x_d=X_D, x=GAPS),
 }
+
+
+class Dataset:
+    """As xarray has it; checked by mypy, not run."""
+
+    data_vars: Mapping[str, Any] = {}
+
+
+TABLES: list[Table] = [Frame(), Dataset(), np.zeros(3, [("x_d", "f8")]), 3.0]  # type: ignore[list-item]
 
 
 @pytest.mark.parametrize("how", MISSING)
@@ -269,7 +278,7 @@ def test_units_of_names() -> None:
 )
 def test_odd_arguments_are_refused_before_the_log_is_read(known: dict[str, Any], message: str) -> None:
     with pytest.raises(HybridSepError, match=message):
-        hybridsep.fit(None, **known)
+        hybridsep.fit(None, **known)  # type: ignore[arg-type]
 
 
 def test_messages_name_pythons_arguments_too() -> None:
