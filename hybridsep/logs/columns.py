@@ -25,6 +25,7 @@ _COUNTS = (
 _OTHERS = re.compile(r"/|rpm|min-1|hz|%", re.IGNORECASE)  # in units of what is no position; another one may be given
 
 _DATA = re.compile(r"(\.(data|values?|signals))+$", re.IGNORECASE)  # names of what MATLAB has beside a signal's time
+_PATH = re.compile("[./]")
 _GAP = 1.5  # intervals of the slower column between two samples of the faster one from which on the latter has a gap
 _SAME = 1e-6  # largest difference of two channels' times, in intervals, at which they are the same: rounding
 
@@ -183,8 +184,8 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
     if role in source.roles:
         return source.roles[role]
     known = known_names(role, source.names)
-    if not known and not (source.axes or axes_of(source.names)):  # in structs, log.x_d, or timeseries, log.x_d.Data
-        ends = {name: _DATA.sub("", name).rpartition(".")[2] for name in source.names}
+    if not known and not (source.axes or axes_of(source.names)):  # in structs and models, timeseries too, log.x_d.Data
+        ends = {name: _PATH.split(_DATA.sub("", stated_unit(name)[0]))[-1] for name in source.names}
         known = [name for best in [known_names(role, [*ends.values()])] for name in source.names if ends[name] in best]
     if len(set(known)) > 1:
         raise LogError(f"{source.path}: column {role} may be {listed(known)}; name it: --{role} NAME")

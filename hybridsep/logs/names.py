@@ -34,11 +34,22 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 
 _SOLL, _IST = {"sollposition", "solllage", "lagesollwert"}, {"istposition", "istlage", "lageistwert"}
 _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "sp", "des", "desired", "target"}
-_COMMANDED |= {"goal", "commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"} | _SOLL
+_COMMANDED |= {
+    "goal",
+    "action",
+    "commands",
+    "demand",
+    "nominal",
+    "noml",
+    "planned",
+    "consigne",
+    "soll",
+    "sollwert",
+} | _SOLL
 _MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "pv", "ist"} | _IST
-_MEASURED |= {"mesure", "istwert", "present"}
+_MEASURED |= {"mesure", "istwert", "present", "observation"}
 _ESTIMATED = {"estimate", "estimated"}  # measured where nothing else is
-_POSITION = {"pos", "position", "positions", "lage", "angle", "pl", "pctrl", "pulses"} | _SOLL | _IST
+_POSITION = {"pos", "position", "positions", "lage", "weg", "angle", "pl", "pctrl", "pulses"} | _SOLL | _IST
 _FILLING = {"axis", "value", "values", "data", "state", "states", "current"}
 _SENT = {"control", "input"}  # commanded beside a word for the position, else a controller's output
 _VELOCITY = {"vel", "velo", "velocity", "velocities", "speed", "speeds", "geschwindigkeit"}

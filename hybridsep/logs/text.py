@@ -33,7 +33,12 @@ _BLOCK = 10_000  # lines that are converted at once
 _COMMENTS = ("#", "%", "//", "!")  # beginnings of a comment line
 
 _DELIMITERS = (";", "\t", ",", "|", None)  # delimiters by precedence; None is blanks
-_UNIT_ROWS = ("unit", "units", "einheit", "einheiten", "y_unit_label")  # first cells of rows of units
+_UNIT_ROW = re.compile("unit|einheit", re.IGNORECASE)  # in the first cell of a row of units
+_HEAD = 4  # rows above the numbers of which one has the names: units and descriptions may be below it
+_FACTOR = re.compile(r"[x*×/]\s*[.,\d]")  # begins a cell of a row of factors, which no reader may pass over
+_WITH_UNIT = re.compile(
+    r"([+-]?[\d.,]+(?:e[+-]?\d+)?)\s+([a-zµ°]+)", re.IGNORECASE
+)  # 0.001 sec, as in MATLAB's timetables
 _NO_UNITS = ("", "-", "1", "[-]")  # entries of a row of units where a column has none
 _BLANK = -math.inf  # stands for a blank cell of the command until it is filled
 _APART = 0.9  # share of rows with one of the two positions from which on channels have times of their own
@@ -87,6 +92,7 @@ class _Table:
     header: int  # line number of the names, from 1
     first: int  # line number from which numbers are read
     clocks: set[int]  # indices of columns of timestamps with a time of day
+    in_cells: dict[int, str]  # index of a column → unit behind each of its numbers
 
 
 class TextSource(Source):
@@ -244,7 +250,7 @@ class TextSource(Source):
         for i in use:
             if i >= len(fields):
                 continue
-            name, field = self.names[i], fields[i]
+            name, field = self.names[i], fields[i].removesuffix(self._table.in_cells.get(i, "")).rstrip()
             may_miss = name in (self.measured, *self.twins.get(self.measured, ()))
             try:
                 if i in self._table.clocks:
@@ -385,14 +391,14 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
         return None
     number, line = known[0]
     mark = next((mark for mark in _DELIMITERS if mark and mark in line), None)
-    return _Table(_names(line, mark), {}, mark, None, False, number, number + 1, set())
+    return _Table(_names(line, mark), {}, mark, None, False, number, number + 1, set(), {})
 
 
 def _width(fields: Sequence[str]) -> int:
     """Return the number of fields of a row of numbers, 0 if more than half of them are neither that nor missing."""
-    numbers = sum(map(_is_written, fields))
-    others = [text for text in fields if text and not _is_written(text) and not _MISSING.fullmatch(text)]
-    return len(fields) if numbers and numbers >= sum(not stamp_kind(text) for text in others) else 0
+    others = [text for text in fields if not (_is_written(text) or _WITH_UNIT.fullmatch(text))]
+    texts = [text for text in others if text and not _MISSING.fullmatch(text) and not stamp_kind(text)]
+    return len(fields) if len(fields) > len(others) and len(fields) - len(others) >= len(texts) else 0
 
 
 def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int, mark: str | None) -> _Table | None:
@@ -402,6 +408,7 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
     blank = next(i for i in range(width) if any(row[width - 1 - i] for row in fields))  # at the ends of rows
     kinds = [_kind([row[i] for row in fields]) for i in range(width)]
     above: list[tuple[int, list[str]]] = []
+    apart = False  # whether other comments stand between
     for number, _, line in reversed(rows[:start]):
         names = _names(line, mark)
         if mark is None and len(names) == width - 1 and ("date", "time") in pairwise(kinds):
@@ -412,22 +419,33 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
         if len(names) == width - blank - 1 and (blank == 0) and _are_row_names([row[0] for row in fields]):
             names = ["", *names]
         fits = width - blank <= len(names) <= width
+        is_comment = line.lstrip().startswith(_COMMENTS)
         if fits and not all(map(is_number, names)) and not any(map(stamp_kind, names)):
-            above.append((number, names))
-        elif not line.lstrip().startswith(_COMMENTS):
+            above += [(number, names)] if n_known(names) or not (apart and is_comment) else []
+        elif not (apart := is_comment):
             break
     if not above:
         return None
-    keyed = next((row for _, row in above[:9] if row[0].casefold() in _UNIT_ROWS), None)  # a row that is called so
-    numeric = [i for i in range(len(above[0][1])) if not kinds[i]]  # hh:mm:ss may stand above timestamps
-    has_units = len(above) > 1 and _is_row_of_units([above[0][1][i] for i in numeric])
-    nearest = above[has_units:][:2]  # the one with more known names counts
-    header, names = max(nearest, key=lambda row: n_known(row[1]) if len(row[1]) == len(nearest[0][1]) else -1)
-    units = dict(zip(names, above[0][1] if has_units else ["", *(keyed or [""])[1:]], strict=False))
+    # hh:mm:ss may stand above timestamps
+    texts = [[one for one, kind in zip(row, kinds, strict=False) if not kind] for _, row in above]
+    of_units = [len(above) > 1 and _is_row_of_units(row) for row in texts]
+    factors = (i + 1 for i, (_, row) in enumerate(above) if any(map(_FACTOR.match, row)))  # nothing above is looked at
+    near = [i for i, is_units in enumerate(of_units[: min(_HEAD, next(factors, _HEAD))]) if not is_units] or [0]
+    alike = [i for i in near if len(above[i][1]) == len(above[near[0]][1])]
+    at = max(alike, key=lambda i: (n_known(above[i][1]), -i))  # the one with more known names counts, else the nearest
+    header, names = above[at]
+    below = (row for (_, row), is_units in zip(above[:at], of_units, strict=False) if is_units)
+    keyed = (row for _, row in above[:9] if row is not names and _UNIT_ROW.search(row[0]) and _is_row_of_units(row[1:]))
+    units = dict(zip(names, next(below, ["", *next(keyed, [""])[1:]]), strict=False))
+    cells = [
+        {one and one[2] for row in fields if row[i] for one in [_WITH_UNIT.fullmatch(row[i])]} for i in range(width)
+    ]
+    in_cells = {i: unit for i, (unit, *other) in enumerate([*one, ""] for one in cells) if unit and other == [""]}
+    units |= {names[i]: unit for i, unit in in_cells.items() if i < len(names)}
     comma, settled = _comma_of([[row[i] for row in fields] for i in range(width)])
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
-    return _Table(names, stated, mark, comma, settled, header, rows[start][0], clocks)
+    return _Table(names, stated, mark, comma, settled, header, rows[start][0], clocks, in_cells)
 
 
 def _is_written(text: str) -> bool:

@@ -238,7 +238,8 @@ OF_TOOLS = (
     "q_des[{}] | q[{}] @ 1; x_d({}) | x({}) @ 1; q_d[{}] | q[{}] | dq[{}] @ 2; _RPX | _TPX | _TEX; "
     "TPOS | APOS | POSERR; RPOS(X) | FPOS(X) | APOS(X) | TPOS(X); DPOS AXIS(0) | MPOS AXIS(0) | FE AXIS(0); "
     "goal_position | present_position | present_velocity; SetPos | ActPos | TargetPos; "
-    "RPOS | FPOS | DPOS | MPOS"
+    "RPOS | FPOS | DPOS | MPOS; action.pan.pos | observation.state.pan.pos; Sollwert_Weg | Istwert_Weg; "
+    "Group1.Pos.SetpointPosition | Group1.Pos.CurrentPosition | Group1.Pos.FollowingError"
 )
 """Commanded and measured position, then others, as controllers, drives and recorders call them; and the axis."""
 
