@@ -417,7 +417,7 @@ def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterato
     if late * log.T_s > 0.1 and found.lag < 1.5 * late:  # noise spreads a mixture over lags
         words = (
             f"the measured position lags its command by {least}{late} samples ({late * log.T_s:.3g} s), drive, dead "
-            "time and recorder together"
+            f"time and recorder together{': were ms given as s?' if late * log.T_s > 1.0 else ''}"
         )
         options = (("--delay N", "where the recorder is known to be N samples late"),)
         yield Finding("late", words, {"lag": late * log.T_s}, options=options)

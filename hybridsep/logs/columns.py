@@ -14,13 +14,7 @@ from .names import ROLES, axes_of, beside_error, has_word, known_names, signals_
 from .source import Block, Source
 from .text import is_number, stamp_kind
 from .times import COUNTED
-from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
-
-_COUNTS = (
-    "count", "counts", "cts", "cnt", "qc", "inc", "incr", "inkr", "increment", "increments", "pulse", "pulses", "tick",
-    "ticks", "lu", "puu", "step", "steps",
-)  # fmt: skip
-"""Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
+from .units import COUNTS, POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
 _OTHERS = re.compile(r"/|rpm|min-1|hz|%", re.IGNORECASE)  # in units of what is no position; another one may be given
 
@@ -66,7 +60,7 @@ def choose_columns(
             remarks = [*remarks, f"column {brief(time)} is read as the time; columns (--t) names another"]
         elif not time_needed:
             time = _row_labels(source)
-    if time and "t" not in given and not time_needed and plain_name(_stated(source, time)) in _COUNTS:
+    if time and "t" not in given and not time_needed and plain_name(_stated(source, time)) in COUNTS:
         time = None  # it counts samples, and the interval is given
     told, sign = _told_by_error(source, chosen, given, error) if error is not None else ("", 0)
     if time is not None or "t" in given or time_needed:
@@ -273,7 +267,7 @@ def _position(source: Source, name: str, given: str | None, error: int) -> Colum
     text = _stated(source, name)
     unit = position_unit(text) if text else None
     given = None if error and unit is not None else given  # an error may have a unit of its own
-    counts = plain_name(text) in _COUNTS or (given is not None and unit is None and not _OTHERS.search(text))
+    counts = plain_name(text) in COUNTS or (given is not None and unit is None and not _OTHERS.search(text))
     if counts and given is None:
         raise LogError(f"{it} is in encoder counts; give the length of one, such as unit='0.1um' (--unit 0.1um)")
     if text and unit is None and not counts:

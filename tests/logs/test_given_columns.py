@@ -261,6 +261,8 @@ def test_ticks_need_no_unit_where_the_interval_is_given() -> None:
 
 def test_units_of_names() -> None:
     assert stated_unit("Position, mm") == ("Position", "mm")
+    assert stated_unit("Position (mm) set") == ("Position set", "mm")
+    assert [stated_unit(f"x ({unit})")[1] for unit in ("0.1um", "counts", "X", "V")] == ["0.1um", "counts", "", ""]
     assert stated_unit("t_milliseconds") == stated_unit("t [milliseconds]") == ("t", "milliseconds")
     for name in ("Boom Ms", "Boom ms", "Room in", "q[0]", "q(1)", "x_m"):
         assert stated_unit(name) == (name, "")
