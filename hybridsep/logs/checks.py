@@ -22,7 +22,7 @@ from ..base.signals import Array, Indices
 from ..base.threads import one_blas_thread
 from .columns import error_option
 from .log import Log, uneven
-from .units import POSITION_UNITS, UNIT_OPTIONS
+from .units import POSITION_UNITS
 
 _SAMPLES_MIN = 100  # samples below which nothing can be learned and judged: a window of the default length
 
@@ -181,7 +181,8 @@ def _unit(log: Log) -> Iterator[Finding]:
         "a feed axis has: are the positions in a smaller unit or, of a rotary axis, in deg?"
     )
     evidence, stated = {"travel": travel, "acceleration": usual}, log.unit_stated
-    yield Finding("unit", words, evidence, refused=not stated, options=() if stated else UNIT_OPTIONS)
+    options = (("--unit mm", "a linear axis in mm"), ("--unit um", "in µm"), ("--unit deg", "a joint in degrees"))
+    yield Finding("unit", words, evidence, refused=not stated, options=() if stated else options)
 
 
 class _Following(NamedTuple):

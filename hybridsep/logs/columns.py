@@ -60,7 +60,7 @@ def choose_columns(
             remarks = [*remarks, f"column {brief(time)} is read as the time; columns (--t) names another"]
         elif not time_needed:
             time = _row_labels(source)
-    if time and "t" not in given and not time_needed and plain_name(_stated(source, time)) in COUNTS:
+    if time and "t" not in given and not time_needed and plain_name(_stated(source, time)).rstrip("s") in COUNTS:
         time = None  # it counts samples, and the interval is given
     told, sign = _told_by_error(source, chosen, given, error) if error is not None else ("", 0)
     if time is not None or "t" in given or time_needed:
@@ -226,10 +226,9 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
         return LogError(f"{source.path}: {it}; call the commanded position so in the file")
     what = ", ".join(repr(name) if name == role else f"{brief(name)} ({role})" for role, name in names.items())
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
-    options = " ".join(f"--{role} NAME" for role in names)
-    options += " (or --T_s SECONDS instead of --t)" if "t" in names else ""
-    of_python = f"; in Python by columns={{{', '.join(f'{role!r}: NAME' for role in names)}}}"
-    of_python += ", or T_s=SECONDS" if "t" in names else ""
+    of_times = (" (or --T_s SECONDS instead of --t)", ", or T_s=SECONDS") if "t" in names else ("", "")
+    options = " ".join(f"--{role} NAME" for role in names) + of_times[0]
+    of_python = f"; in Python by columns={{{', '.join(f'{role!r}: NAME' for role in names)}}}{of_times[1]}"
     there = f"{which} missing, the file has {listed(source.names)}"
     errors, speeds = ([name for name in source.names if has_word(kind, name)] for kind in ("error", "velocity"))
     instead = "; velocities are none: record positions" if speeds and not errors and set(names) != {"t"} else ""
@@ -267,7 +266,7 @@ def _position(source: Source, name: str, given: str | None, error: int) -> Colum
     text = _stated(source, name)
     unit = position_unit(text) if text else None
     given = None if error and unit is not None else given  # an error may have a unit of its own
-    counts = plain_name(text) in COUNTS or (given is not None and unit is None and not _OTHERS.search(text))
+    counts = plain_name(text).rstrip("s") in COUNTS or (given is not None and unit is None and not _OTHERS.search(text))
     if counts and given is None:
         raise LogError(f"{it} is in encoder counts; give the length of one, such as unit='0.1um' (--unit 0.1um)")
     if text and unit is None and not counts:

@@ -30,14 +30,12 @@ from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated
 
 class _Frame(Protocol):
     @property
-    def columns(self) -> Any:
-        """Names, or in Arrow columns."""
+    def columns(self) -> Any: ...
 
 
 class _Dataset(Protocol):
     @property
-    def data_vars(self) -> Any:
-        """Variables by name."""
+    def data_vars(self) -> Any: ...
 
 
 Table = _Frame | _Dataset | NDArray[np.void]  # of pandas, polars or Arrow; xarray; a structured array

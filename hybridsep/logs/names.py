@@ -34,18 +34,8 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 
 _SOLL, _IST = {"sollposition", "solllage", "lagesollwert"}, {"istposition", "istlage", "lageistwert"}
 _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "sp", "des", "desired", "target"}
-_COMMANDED |= {
-    "goal",
-    "action",
-    "commands",
-    "demand",
-    "nominal",
-    "noml",
-    "planned",
-    "consigne",
-    "soll",
-    "sollwert",
-} | _SOLL
+_COMMANDED |= {"goal", "action", "commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"}
+_COMMANDED |= _SOLL
 _MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "pv", "ist"} | _IST
 _MEASURED |= {"mesure", "istwert", "present", "observation"}
 _ESTIMATED = {"estimate", "estimated"}  # measured where nothing else is
@@ -142,18 +132,14 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
 def beside_error(names: Sequence[str], error: str = "") -> dict[str, str]:
     """Return the positions by role of the axis whose words an error's name has, without a name of the only one."""
     commanded, measured, _ = _by_words(names)
-    pairs, words = axes_of(names), _words(error)
-    both = {
-        "x_d": {axis: pair[0] for axis, pair in pairs.items()},
-        "x": {axis: pair[1] for axis, pair in pairs.items()},
-    }
-    for known in (both, {"x_d": commanded, "x": measured}):
-        axes = {*known["x_d"]} or {*known["x"]}
-        if words:
-            n = {axis: len(own) for axis in {*known["x_d"], *known["x"]} if (own := _words(axis)) and own <= words}
-            axes = {axis for axis in n if n[axis] == max(n.values())}
-        if len(axes) == 1:
-            return {role: of_role[axis] for role, of_role in known.items() for axis in axes if axis in of_role}
+    words, both = _words(error), {axis: {"x_d": x_d, "x": x} for axis, (x_d, x) in axes_of(names).items()}
+    alone = {axis: {"x": x} for axis, x in measured.items() if words or not commanded}
+    for known in (both, alone | {axis: {"x_d": x_d} for axis, x_d in commanded.items()}):
+        own = {axis: _words(axis) for axis in known}
+        n = {axis: len(own[axis] & words) for axis in own if not words or (own[axis] and own[axis] <= words)}
+        best = [axis for axis in n if n[axis] == max(n.values())]
+        if len(best) == 1:
+            return known[best[0]]
     return {}
 
 

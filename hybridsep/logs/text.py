@@ -36,9 +36,7 @@ _DELIMITERS = (";", "\t", ",", "|", None)  # delimiters by precedence; None is b
 _UNIT_ROW = re.compile("unit|einheit", re.IGNORECASE)  # in the first cell of a row of units
 _HEAD = 4  # rows above the numbers of which one has the names: units and descriptions may be below it
 _FACTOR = re.compile(r"[x*×/]\s*[.,\d]")  # begins a cell of a row of factors, which no reader may pass over
-_WITH_UNIT = re.compile(
-    r"([+-]?[\d.,]+(?:e[+-]?\d+)?)\s+([a-zµ°]+)", re.IGNORECASE
-)  # 0.001 sec, as in MATLAB's timetables
+_WITH_UNIT = re.compile(r"^([+-]?[\d.,]+(?:e[+-]?\d+)?)\s+([a-zµ]+)$", re.IGNORECASE)  # 0.001 sec, as of MATLAB
 _NO_UNITS = ("", "-", "1", "[-]")  # entries of a row of units where a column has none
 _BLANK = -math.inf  # stands for a blank cell of the command until it is filled
 _APART = 0.9  # share of rows with one of the two positions from which on channels have times of their own
@@ -212,7 +210,7 @@ class TextSource(Source):
         if text[0].isdigit() or text.isspace() or text.lstrip().startswith(_COMMENTS):
             return not text[0].isdigit()
         fields = split(text.strip(" \r\n"), self._table.delimiter)
-        if any(is_number(decimal_points(field)) or stamp_kind(field) for field in fields):
+        if any(is_number(field.replace(",", ".")) or stamp_kind(field) for field in fields):
             return False
         self._left_out.append((number, text))
         return True
@@ -273,9 +271,10 @@ class TextSource(Source):
     def _number(self, field: str) -> float:
         """Return a number; ValueError if it is none, or a comma in it has no meaning in this file."""
         comma = self._comma
-        if ("." in field) if comma == "." else ("," in field and (comma is None or not _THOUSANDS.fullmatch(field))):
+        wrong = "." in field if comma == "." else "," in field and (comma is None or not _THOUSANDS.fullmatch(field))
+        if wrong or "_" in field:
             raise ValueError(field)
-        return _number(field.replace(",", comma or ""))
+        return float(field.replace(",", comma or ""))
 
 
 def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
@@ -290,20 +289,13 @@ def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]
     return own, twins
 
 
-def _number(text: str) -> float:
-    """Return a number with a decimal point; ValueError if it is none, or an underscore is one of its digits."""
-    if "_" in text:
-        raise ValueError(text)
-    return float(text)
-
-
 def is_number(text: str) -> bool:
-    """Return whether a field is a number with a decimal point."""
+    """Return whether a field is a number with a decimal point; an underscore is no digit of one."""
     try:
-        _number(text)
+        float(text)
     except ValueError:
         return False
-    return True
+    return "_" not in text
 
 
 def stamp_kind(text: str) -> str:
@@ -322,11 +314,6 @@ def _nanoseconds(text: str) -> float:
     _, hour, minute, second, fraction, half = match.groups()
     hours = int(hour) if half is None else int(hour) % 12 + 12 * (half in "Pp")
     return float((3600 * hours + 60 * int(minute) + int(second)) * _SECOND + int((fraction or "").ljust(9, "0")))
-
-
-def decimal_points(text: str) -> str:
-    """Return a text with decimal points for commas."""
-    return text.replace(",", ".")
 
 
 def split(line: str, delimiter: str | None) -> list[str]:
@@ -396,7 +383,7 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
 
 def _width(fields: Sequence[str]) -> int:
     """Return the number of fields of a row of numbers, 0 if more than half of them are neither that nor missing."""
-    others = [text for text in fields if not (_is_written(text) or _WITH_UNIT.fullmatch(text))]
+    others = [text for text in fields if not (_is_written(text) or _WITH_UNIT.match(text))]
     texts = [text for text in others if text and not _MISSING.fullmatch(text) and not stamp_kind(text)]
     return len(fields) if len(fields) > len(others) and len(fields) - len(others) >= len(texts) else 0
 
@@ -427,21 +414,17 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
     if not above:
         return None
     # hh:mm:ss may stand above timestamps
-    texts = [[one for one, kind in zip(row, kinds, strict=False) if not kind] for _, row in above]
-    of_units = [len(above) > 1 and _is_row_of_units(row) for row in texts]
+    of_units = [_is_row_of_units([a for a, b in zip(row, kinds, strict=False) if not b]) for _, row in above]
     factors = (i + 1 for i, (_, row) in enumerate(above) if any(map(_FACTOR.match, row)))  # nothing above is looked at
     near = [i for i, is_units in enumerate(of_units[: min(_HEAD, next(factors, _HEAD))]) if not is_units] or [0]
-    alike = [i for i in near if len(above[i][1]) == len(above[near[0]][1])]
-    at = max(alike, key=lambda i: (n_known(above[i][1]), -i))  # the one with more known names counts, else the nearest
+    at = max(near, key=lambda i: (n_known(above[i][1]), -i))  # the one with more known names counts, else the nearest
     header, names = above[at]
     below = (row for (_, row), is_units in zip(above[:at], of_units, strict=False) if is_units)
     keyed = (row for _, row in above[:9] if row is not names and _UNIT_ROW.search(row[0]) and _is_row_of_units(row[1:]))
     units = dict(zip(names, next(below, ["", *next(keyed, [""])[1:]]), strict=False))
-    cells = [
-        {one and one[2] for row in fields if row[i] for one in [_WITH_UNIT.fullmatch(row[i])]} for i in range(width)
-    ]
-    in_cells = {i: unit for i, (unit, *other) in enumerate([*one, ""] for one in cells) if unit and other == [""]}
-    units |= {names[i]: unit for i, unit in in_cells.items() if i < len(names)}
+    behind = [{_WITH_UNIT.sub(r"\2", row[i]) for row in fields[:9] if row[i]} for i in range(len(names))]
+    in_cells = {i: next(iter(one)) for i, one in enumerate(behind) if len(one) == 1 and _is_row_of_units([*one])}
+    units |= {names[i]: unit for i, unit in in_cells.items()}
     comma, settled = _comma_of([[row[i] for row in fields] for i in range(width)])
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
@@ -450,7 +433,7 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
 
 def _is_written(text: str) -> bool:
     """Return whether a field is a number, with a decimal comma or commas between thousands too."""
-    return is_number(decimal_points(text)) or bool(_THOUSANDS.fullmatch(text))
+    return is_number(text.replace(",", ".")) or bool(_THOUSANDS.fullmatch(text))
 
 
 def _comma_of(columns: Sequence[Sequence[str]]) -> tuple[str | None, bool]:

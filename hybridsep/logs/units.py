@@ -27,9 +27,6 @@ POSITION_UNITS: Mapping[str, Unit] = {
 }
 """Units of positions by name; a log's positions are read in metres, or in radians where their unit is an angle."""
 
-UNIT_OPTIONS = (("--unit mm", "a linear axis in mm"), ("--unit um", "in µm"), ("--unit deg", "a joint in degrees"))
-"""Options that say the unit of a log that states none, each with what it means."""
-
 TIME_UNITS: Mapping[str, Unit] = _units("s", {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0})
 """Units of times by name."""
 
@@ -108,15 +105,12 @@ _SPELLINGS |= {
 }
 """Other spellings, in small letters, of the units' names, or of multiples; µ is u."""
 
-COUNTS = (
-    "count", "counts", "cts", "cnt", "qc", "inc", "incr", "inkr", "increment", "increments", "pulse", "pulses", "tick",
-    "ticks", "lu", "puu", "step", "steps",
-)  # fmt: skip
-"""Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
+COUNTS = {"count", "ct", "cnt", "qc", "inc", "incr", "inkr", "increment", "pulse", "tick", "lu", "puu", "step"}
+"""Spellings of an encoder's count where a unit is stated, without a plural's s; its length must be given."""
 
 _SUFFIXES = {
-    "mm", "cm", "um", "nm", "inch", "inches", "meter", "rad", "mrad", "urad", "deg", "mdeg", "arcmin", "arcsec", "s", "ms",
-    "us", "ns", "counts", "ticks",
+    "mm", "cm", "um", "nm", "inch", "inches", "meter", "rad", "mrad", "urad", "deg", "mdeg", "arcmin", "arcsec", "s",
+    "ms", "us", "ns", "counts", "ticks",
 }  # fmt: skip
 """Units that end a name after an underscore or a comma; m is none, as ``x_m`` is rather the measured position."""
 
@@ -188,4 +182,4 @@ def stated_unit(name: str) -> tuple[str, str]:
 
 
 def _is_unit(text: str) -> bool:
-    return position_unit(text) is not None or time_unit(text) is not None or plain_name(text) in COUNTS
+    return position_unit(text) is not None or time_unit(text) is not None or plain_name(text).rstrip("s") in COUNTS
