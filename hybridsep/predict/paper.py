@@ -24,7 +24,7 @@ class PaperModel:
     """State of the paper's model."""
 
     n_rejected: ClassVar[int] = 0
-    largest_rejected: ClassVar[float] = 0.0
+    farthest: ClassVar[float] = 0.0
     learned: ClassVar[tuple[()]] = ()
 
     settings: PredictorSettings = field(metadata=FIXED)

@@ -191,7 +191,7 @@ class HybridPredictor:
         x_pb, _ = self.discrete.forced_response(state.physics, command)  # Eq. (2)
         forecast = state.residual.forecast(ResidualWindow(command, x_pb, start, path), scales)
         self.pending = self._with_error(forecast)
-        std = np.maximum(self.pending.error.std[late:], state.residual.largest_rejected)
+        std = np.maximum(self.pending.error.std[late:], state.residual.farthest)
         return Prediction(x_pb[late:] + start, forecast.e_h[late:], std, self._warm_up(n))
 
     def _with_error(self, forecast: Forecast) -> PredictedWindow:

@@ -22,7 +22,7 @@ class InnovationGate:
 
     n_missing: int = 0  # samples since the last one that was believed
     n_beyond: int = 0  # of these, values beyond the gate, less the values within it that followed
-    largest_rejected: float = 0.0  # m: largest residual out of reach among them
+    farthest: float = 0.0  # m: largest residual out of reach among them
 
 
 def gated(
@@ -36,7 +36,7 @@ def gated(
     ``fastest``, m: largest change from sample to sample, of ``x_pb`` so far or of commands that are known; ``T_s``, s.
     """
     known = largest > 0.0 and fastest > 0.0
-    believed, n_missing, n_beyond, rejected = np.isfinite(e), gate.n_missing, gate.n_beyond, gate.largest_rejected
+    believed, n_missing, n_beyond, farthest = np.isfinite(e), gate.n_missing, gate.n_beyond, gate.farthest
     sizes, patience = np.abs(e), math.ceil(CONSTANTS.patience / T_s)
     if n_beyond == 0 and sizes.max() <= CONSTANTS.gate * (largest + fastest):  # no NaN, and nothing beyond
         return believed, InnovationGate()
@@ -47,7 +47,7 @@ def gated(
         beyond = size > CONSTANTS.gate * (largest + fastest)
         n_beyond = n_beyond + 1 if known and beyond else max(n_beyond - 1, 0)
         if n_beyond > 0 and n_missing <= patience:
-            believed[k], rejected = False, max(rejected, min(size, PREDICTION_MAX))
+            believed[k], farthest = False, max(farthest, min(size, PREDICTION_MAX))
         else:
-            n_missing, n_beyond, rejected, largest = 0, 0, 0.0, max(largest, size)
-    return believed, InnovationGate(n_missing, n_beyond, rejected)
+            n_missing, n_beyond, farthest, largest = 0, 0, 0.0, max(largest, size)
+    return believed, InnovationGate(n_missing, n_beyond, farthest)

@@ -179,9 +179,9 @@ class AveragedModel:
         return self.run.n_rejected
 
     @property
-    def largest_rejected(self) -> float:
+    def farthest(self) -> float:
         """Largest residual among the last samples, m, where these were rejected; else 0."""
-        return self.run.gate.largest_rejected
+        return self.run.gate.farthest
 
     @property
     def last(self) -> float:

@@ -7,12 +7,12 @@
 #include "hsep_predict_constants.h"
 
 typedef struct {
-    hsep_int n_missing;         /* samples since the last one that was believed, */
-    hsep_int n_beyond;          /* of these, values out of reach, less values within reach that followed */
-    hsep_real largest_rejected; /* m, largest residual out of reach among them */
-    hsep_real largest;          /* m, largest residual believed */
-    hsep_real fastest; /* m, largest change from sample to sample, of x_pb so far or of commands that are known */
-    hsep_int known;    /* whether there was a motion, and a residual, before the window */
+    hsep_int n_missing; /* samples since the last one that was believed, */
+    hsep_int n_beyond;  /* of these, values out of reach, less values within reach that followed */
+    hsep_real farthest; /* m, largest residual out of reach among them */
+    hsep_real largest;  /* m, largest residual believed */
+    hsep_real fastest;  /* m, largest change from sample to sample, of x_pb so far or of commands that are known */
+    hsep_int known;     /* whether there was a motion, and a residual, before the window */
 } hsep_gate;
 HSEP_ASSERT_WORDS(hsep_gate, 6);
 
@@ -39,11 +39,11 @@ static inline int hsep_gate_judge(hsep_gate *self, hsep_real e, hsep_real T_s)
         self->n_beyond--;
     }
     if (self->n_beyond > 0 && (hsep_real)self->n_missing <= hsep_ceil(HSEP_AVERAGING_PATIENCE / T_s)) {
-        self->largest_rejected = hsep_fmax(self->largest_rejected, hsep_fmin(size, HSEP_PREDICTION_MAX));
+        self->farthest = hsep_fmax(self->farthest, hsep_fmin(size, HSEP_PREDICTION_MAX));
         return 0;
     }
     self->n_missing = self->n_beyond = 0;
-    self->largest_rejected = 0.0;
+    self->farthest = 0.0;
     self->largest = hsep_fmax(self->largest, size);
     return 1;
 }
