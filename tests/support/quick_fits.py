@@ -13,8 +13,8 @@ def without_larger_structures(patch: pytest.MonkeyPatch) -> None:
 
 def without_other_settings(patch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` try only the default settings: a fifth of its time."""
-    patch.setattr("hybridsep.fitting.choice._SHARES", ())
-    patch.setattr("hybridsep.fitting.choice._Q", ())
+    patch.setattr("hybridsep.fitting.lags._SHARES", ())
+    patch.setattr("hybridsep.fitting.lags._Q", ())
 
 
 def with_short_references(patch: pytest.MonkeyPatch) -> None:
