@@ -79,12 +79,10 @@ def fit(
     machine = checked_name(name) if name else machine_name(logs[0], reading.axis)
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     check_outputs((), inputs)
-    numbers = [] if p is None else _parsed(p, _numbers, "--p must be whole numbers with commas")
+    numbers = _parsed(p, _numbers, "--p must be whole numbers with commas") or []
     lags = [PARAMETERS["p"].checked(one, "--p") for one in numbers]
-    must = "--look-ahead must be a time with its unit, such as 60ms or 0.06s"
-    ahead = None if look_ahead is None else _parsed(look_ahead, _seconds, must)
-    must = "--cascade must be NAME=VALUE with commas, each a number"
-    gains = None if cascade is None else _parsed(cascade, _gains, must)
+    ahead = _parsed(look_ahead, _seconds, "--look-ahead must be a time with its unit, such as 60ms or 0.06s")
+    gains = _parsed(cascade, _gains, "--cascade must be NAME=VALUE with commas, each a number")
     found = [read_log(path, **reading.arguments()) for path in logs]
     # What computes takes seconds to import: a log that cannot be read is said before
     from ..fitting.build import fit_files
@@ -116,10 +114,10 @@ def fit(
     console.print("\n".join(_next_steps(result, files)), soft_wrap=True, highlight=False)
 
 
-def _parsed(text: str, parse: Callable[[str], _Parsed], must: str) -> _Parsed:
-    """Return what an option's text says; ParameterError if it cannot be parsed."""
+def _parsed(text: str | None, parse: Callable[[str], _Parsed], must: str) -> _Parsed | None:
+    """Return what an option's text says, None without one; ParameterError if it cannot be parsed."""
     try:
-        return parse(text)
+        return None if text is None else parse(text)
     except ValueError:
         raise ParameterError(f"{must}, got {text!r}") from None
 

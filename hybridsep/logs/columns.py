@@ -19,7 +19,6 @@ from .units import COUNTS, POSITION_UNITS, TIME_UNITS, Unit, plain_name, positio
 _OTHERS = re.compile(r"/|rpm|min-1|hz|%", re.IGNORECASE)  # in units of what is no position; another one may be given
 
 _DATA = re.compile(r"(\.(data|values?|signals))+$", re.IGNORECASE)  # names of what MATLAB has beside a signal's time
-_PATH = re.compile("[./]")
 _GAP = 1.5  # intervals of the slower column between two samples of the faster one from which on the latter has a gap
 _SAME = 1e-6  # largest difference of two channels' times, in intervals, at which they are the same: rounding
 
@@ -71,8 +70,7 @@ def choose_columns(
     found: dict[str, Column] = {}
     names = {role: name for role, name in chosen.items() if name is not None}
     if len(names) < len(chosen):
-        lacks = [role for role in chosen if role not in names]
-        raise _missing(source, {"error" if role == told else role: given.get(role, role) for role in lacks})
+        raise _missing(source, {"error" if r == told else r: given.get(r, r) for r in chosen if r not in names})
     for role, name in names.items():
         if source.names.count(name) > 1:
             raise LogError(f"{source.path}: column {brief(name)} must occur once, got {source.names.count(name)}")
@@ -179,7 +177,7 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
         return source.roles[role]
     known = known_names(role, source.names)
     if not known and not (source.axes or axes_of(source.names)):  # in structs and models, timeseries too, log.x_d.Data
-        ends = {name: _PATH.split(_DATA.sub("", stated_unit(name)[0]))[-1] for name in source.names}
+        ends = {name: re.split("[./]", _DATA.sub("", stated_unit(name)[0]))[-1] for name in source.names}
         known = [name for best in [known_names(role, [*ends.values()])] for name in source.names if ends[name] in best]
     if len(set(known)) > 1:
         raise LogError(f"{source.path}: column {role} may be {listed(known)}; name it: --{role} NAME")

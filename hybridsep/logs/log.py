@@ -292,7 +292,6 @@ def check_reading(unit: str | None, T_s: float | None) -> float | None:
 # Changes --------------------------------------------------------------------------------------------------------------
 
 _TURN = 2 * math.pi
-_SAME = 1.001  # ratio of errors that rounding leaves, as where one position is made of the other and its error
 
 _ONE_PHASE, _CHANGES = 0.95, 50
 """Share of a slow sensor's changes that come in one sample of every n, which no other log of a hundred reached for any
@@ -320,7 +319,7 @@ def whole_turns(given: Log) -> tuple[Log, str]:
     x_meas[known] = np.unwrap(x_meas[known], period=_TURN)
     x_meas -= _TURN * np.round(np.median(x_meas[known] - x_d[known]) / _TURN)
     # A command may well jump by one turn: the axis then follows it through, and loses it if the jump is taken out.
-    if _error(x_d, x_meas) > _SAME * _error(given.x_d, given.x_meas):
+    if _error(x_d, x_meas) > 1.001 * _error(given.x_d, given.x_meas):  # one may be made of the other and their error
         return given, ""
     first = min(int(where[0]) for where in jumps if len(where))
     said = f"{n} jumps of a whole turn, the first at sample {first + 1}: both positions are unwrapped"

@@ -81,7 +81,6 @@ _SPELLINGS = {
         "um": "micron microns",
         "in": 'inch inches "',
         "10 mm": "cm centimeter centimeters centimetre centimetres",
-        "100 mm": "dm",
         "12 in": "ft foot feet",
         "0.001 in": "mil mils thou",
         "0.001 nm": "pm",

@@ -19,7 +19,6 @@ from hybridsep.logs.log import read_log
 @pytest.mark.parametrize(
     ("measured", "names", "read"),
     [
-        (("x",), {}, "x"),
         (("x_meas",), {}, "x_meas"),
         (("x", "x_meas"), {}, "x_meas"),
         (("x", "x_meas"), {"x": "x"}, "x"),

@@ -92,8 +92,6 @@ MISSING: Mapping[str, Any] = {
 
 
 class Dataset:
-    """As xarray has it; checked by mypy, not run."""
-
     data_vars: Mapping[str, Any] = {}
 
 

@@ -364,7 +364,6 @@ def test_whole_turns_are_unwrapped(tmp_path: Path, unit: str) -> None:
     log = read_log(write(tmp_path / "log.npz", data))
     np.testing.assert_allclose([log.x_d, log.x_meas], 2 * np.pi / turn * np.array([x_d, x]), atol=1e-9)
     assert "jumps of a whole turn, the first at sample " in log.remarks[0]
-    for name in set(data) & {f"x_d [{unit}]", f"x [{unit}]"}:  # of the other one there is the error
-        one = {name: data[name], "error": x_d - x}
-        log = read_log({"t": data["t"], **one}, columns={"error": "error"})
+    for name in (f"x_d [{unit}]", f"x [{unit}]"):  # of the other one there is the error
+        log = read_log({"t": data["t"], name: data[name], "error": x_d - x}, columns={"error": "error"})
         np.testing.assert_allclose([log.x_d, log.x_meas], 2 * np.pi / turn * np.array([x_d, x]), atol=1e-9)
