@@ -62,7 +62,7 @@ def test_without_an_integrator_and_feed_forward_it_is_one_mode() -> None:
 )
 def test_gains_that_cannot_be(changed: dict[str, Any], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        hybridsep.fit(None, cascade={**gains("X"), **changed})
+        hybridsep.fit(None, cascade={**gains("X"), **changed})  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
