@@ -389,7 +389,7 @@ def _width(fields: Sequence[str]) -> int:
 
 
 def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int, mark: str | None) -> _Table | None:
-    """Return the table of a run of rows below its names, and perhaps a row of units; None without them."""
+    """Return the table of a run of rows below its names, perhaps of units too, hh:mm:ss of timestamps; None without."""
     fields = [row for _, row, _ in rows[start:end]]
     width = len(fields[0])
     blank = next(i for i in range(width) if any(row[width - 1 - i] for row in fields))  # at the ends of rows
@@ -413,7 +413,6 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
             break
     if not above:
         return None
-    # hh:mm:ss may stand above timestamps
     of_units = [_is_row_of_units([a for a, b in zip(row, kinds, strict=False) if not b]) for _, row in above]
     factors = (i + 1 for i, (_, row) in enumerate(above) if any(map(_FACTOR.match, row)))  # nothing above is looked at
     near = [i for i, is_units in enumerate(of_units[: min(_HEAD, next(factors, _HEAD))]) if not is_units] or [0]
@@ -425,7 +424,8 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
     behind = [{_WITH_UNIT.sub(r"\2", row[i]) for row in fields[:9] if row[i]} for i in range(len(names))]
     in_cells = {i: next(iter(one)) for i, one in enumerate(behind) if len(one) == 1 and _is_row_of_units([*one])}
     units |= {names[i]: unit for i, unit in in_cells.items()}
-    comma, settled = _comma_of([[row[i] for row in fields] for i in range(width)])
+    bare = [[row[i].removesuffix(in_cells.get(i, "")).rstrip() for row in fields] for i in range(width)]
+    comma, settled = _comma_of(bare)
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
     return _Table(names, stated, mark, comma, settled, header, rows[start][0], clocks, in_cells)

@@ -61,7 +61,7 @@ TWO_ROWS = "0,1,2\n1,3,4\n"
         "epoch_ms,q_des_inch,q_meter\n0,39.37007874015748,2\n1000,118.11023622047244,4\n",
         "t;x_d;x\nms;mm;um\nSR1;CH1;CH2\n0;1000;2e6\n1000;3000;4e6\n",
         # Units in cells, as MATLAB writes durations; rows with a key
-        "Time;x_d;x\n0 ms;1000 mm;2\n1000 ms;3000 mm;4\n",
+        "Time;x_d;x\n0 ms;1000 mm;2.0 m\n1000 ms;3000 mm;4.0 m\n",
         "trace_path,time,Root/x_ref,Root/x_meas\ntrace_unit,s,mm,-\nvalues,0,1000,2\nvalues,1,3000,4\n",
         "Name;Zeit;Soll;Ist\nEinheit;ms;mm;mm\n;0;1000;2000\n;1000;3000;4000\n",
     ],
