@@ -140,7 +140,7 @@ FINDINGS: Mapping[str, Explanation] = {
     ),
     "begins anew": Explanation(
         "The measured position leaps from one end of its range to the other between two samples, as the position of a "
-        "modulo axis in mm does, or a counter of few bits. Whole turns and counters of 16 bits are recognised otherwise.",
+        "modulo axis in mm does, or a counter of few bits. Whole turns and counters of 16 bits are recognised.",
         "Unwrap both positions before, by the length after which they begin anew, as your controller must do too.",
     ),
     "repeated samples": Explanation(
