@@ -11,6 +11,7 @@ several times is remembered as a fading mean: with only the last one, what the p
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,10 @@ _UPDATES = 25
 
 _ALIKE = 1e-100  # square of a change, m², that counts as 0: sums of smaller ones would slow a processor down
 
+PULSE = 14
+"""Samples of the change of a command that the physics model's answer and the expert's of the command are compared by: what
+a plan may ask for at once."""
+
 _SAME = 1e-5  # distance, relative to the changes', below which stretches under a compensator are the same
 
 
@@ -31,6 +36,9 @@ class Memory:
 
     commands: Array  # (n + stride,), m: as they came, as far as they are known, relative to the start
     residuals: Array  # (n,), m: of the physics model, as far as they are measured
+    # (n,), m: commands of the drive at these, as late as the command's expert takes them, and what they are before x_pb
+    late: Array
+    leads: Array
     repeats: Array  # (n,): how often each came before, as far as it was alike
     distances: Array  # (n,), m²: ``D_τ`` of the lags n … 1
     moved: float  # m²: ``S``
@@ -39,7 +47,7 @@ class Memory:
     @classmethod
     def init(cls, n: int, Np: int) -> "Memory":
         """Return a memory of ``n`` samples of a run at rest, for windows of ``Np``."""
-        return cls(np.zeros(n + max(1, Np // _UPDATES)), np.zeros(n), np.zeros(n), np.zeros(n), 0.0, 0)
+        return cls(np.zeros(n + max(1, Np // _UPDATES)), *np.zeros((5, n)), 0.0, 0)
 
     def restart(self) -> "Memory":
         """Return the memory at the beginning of another run, at rest at its start, after a sample without residual.
@@ -49,9 +57,11 @@ class Memory:
         n_measured, size = max(len(self.commands) - self.n_ahead, 0), len(self.residuals)
         unknown = np.full(len(self.commands) - n_measured, self.commands[0])
         commands = np.concatenate((unknown, self.commands[:n_measured]))
+        late = np.append(self.late[1:], commands[-1])[:size] - commands[-1]
         commands = np.append(commands[1:], commands[-1]) - commands[-1]
-        residuals, repeats = (np.append(one[1:], 0.0)[:size] for one in (self.residuals, self.repeats))  # size may be 0
-        return Memory(commands, residuals, repeats, np.zeros(size), 0.0, 0)
+        kept = (self.residuals, self.leads, self.repeats)
+        residuals, leads, repeats = (np.append(one[1:], 0.0)[:size] for one in kept)  # size may be 0
+        return Memory(commands, residuals, late, leads, repeats, np.zeros(size), 0.0, 0)
 
     def append_commands(self, path: Array, n_known: int | None, Np: int) -> "Memory":
         """Return the memory that knows the first ``n_known`` commands of those to predict, ``(m,)``, m."""
@@ -73,31 +83,46 @@ class Memory:
         n_ahead = max(self.n_ahead, len(path[:n_known]))
         return replace(self, commands=commands[len(new) :], distances=distances, moved=moved, n_ahead=n_ahead)
 
-    def found(self, n: int, *, modified: bool = False) -> tuple[int, float]:
+    def found(self, n: int, before: int = 0) -> tuple[int, float]:
         """Return the place of the residuals after the commands most like those ahead, and how they count; or zeros.
 
-        ``n``: samples from the last measured to the last known command; ``modified``: whether a compensator plans.
+        ``n``: samples from the last measured to the last known command; ``before``: if a compensator plans, those that
+        are compared before them.
         """
-        size = len(self.residuals)
-        if size <= n:
+        size, first = len(self.residuals), max(before, 1)
+        if size < n + first:
             return 0, 0.0
-        compared = np.maximum(self.distances, _SAME * self.moved if modified else 0.0)
-        place = size - n - int(np.argmin(compared[1 : size - n + 1][::-1]))  # the shortest lag of equals
+        compared = np.maximum(self.distances, _SAME * self.moved if before else 0.0)
+        place = size - n - int(np.argmin(compared[first : size - n + 1][::-1]))  # the shortest lag of equals
         distance, tolerated = float(self.distances[place]), CONSTANTS.recall_tolerance**2 * self.moved
         return place, tolerated / (tolerated + distance) if distance > 0.0 else 0.0
 
-    def recalled(self, n: int, *, modified: bool = False) -> tuple[Array, float, float]:
-        """Return the residuals that are :meth:`found`, ``(n,)``, m, the one before, and how they count."""
-        place, alike = self.found(n, modified=modified)
+    def recalled(self, n: int, before: int = 0) -> "Recalled":
+        """Return what is :meth:`found`, with the samples ``before`` it, and the last ones."""
+        place, alike = self.found(n, before)
+        first, signals = max(before, 1), np.stack((self.residuals, self.late, self.leads))
         if place == 0:
-            return np.zeros(n), 0.0, 0.0
-        return self.residuals[place : place + n], float(self.residuals[place - 1]), alike
+            return Recalled(np.zeros((3, first + n)), np.zeros((3, first)), 0.0)
+        return Recalled(signals[:, place - first : place + n], signals[:, signals.shape[1] - first :], alike)
 
-    def remember(self, e: Array, n: int = 0) -> "Memory":
-        """Return the memory with residuals of measured samples, ``(m,)``, m; ``n``: under a compensator, as above."""
-        m, (place, alike) = len(e), self.found(n, modified=True) if n else (0, 0.0)
-        then, repeats = (self.residuals, alike * (self.repeats + 1.0)) if place else (e, np.zeros(m))
-        then, repeats = then[place : place + m], repeats[place : place + m]
-        kept = np.where(repeats < CONSTANTS.recall_repeats, 0.0, (1.0 - CONSTANTS.recall_share) * alike)
-        residuals, repeats = np.append(self.residuals, e + kept * (then - e)), np.append(self.repeats, repeats)
-        return replace(self, residuals=residuals[m:], repeats=repeats[m:], n_ahead=max(self.n_ahead - m, 0))
+    def remember(self, signals: Array, n: int, before: int = 0) -> "Memory":
+        """Return the memory with measured samples, ``(3, m)``, m: residuals, late commands, leads; others: as above."""
+        m, (place, alike) = signals.shape[1], self.found(n, before) if before else (0, 0.0)
+        known, repeats = np.stack((self.residuals, self.late, self.leads)), np.zeros(m)
+        if place:
+            repeats = alike * (self.repeats[place : place + m] + 1.0)
+            share = (1.0 - CONSTANTS.recall_share) * alike
+            kept = np.where(repeats < CONSTANTS.recall_repeats, 0.0, share)
+            signals = signals + kept * (known[:, place : place + m] - signals)
+        residuals, late, leads = np.hstack((known, signals))[:, m:]
+        repeats = np.append(self.repeats, repeats)[m:]
+        n_ahead = max(self.n_ahead - m, 0)
+        return replace(self, residuals=residuals, late=late, leads=leads, repeats=repeats, n_ahead=n_ahead)
+
+
+class Recalled(NamedTuple):
+    """Residuals, late commands and leads, rows, m."""
+
+    then: Array  # (3, before + n): that are recalled
+    now: Array  # (3, before): the last ones
+    alike: float  # how they count
