@@ -100,7 +100,7 @@ VARIANTS: Mapping[str, Changes] = {
     "rows are independent": constants(correlation_max=1.0),
     "no recall": {
         AVERAGING + "hsep_recall.h": [
-            ("    if (self->size <= self->n) {", "    if (self->size <= self->n + self->size) {")
+            ("    if (self->size < n +", "    if (self->size < self->size + n +")
         ]
     },
     "no first differences of disturbances": constants(difference_share=1e-6),

@@ -23,22 +23,19 @@ _UPDATES = 25
 
 _ALIKE = 1e-100  # square of a change, m², that counts as 0: sums of smaller ones would slow a processor down
 
-PULSE = 14
-"""Samples of the change of a command that the physics model's answer and the expert's of the command are compared by: what
-a plan may ask for at once."""
+PULSE = 14  # samples of a change of the command that answers to it are compared by: what a plan may ask for at once
 
 _SAME = 1e-5  # distance, relative to the changes', below which stretches under a compensator are the same
 
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """Commands and residuals, oldest first; zeros before the first ones."""
+    """Commands and what was measured, oldest first; zeros before the first ones."""
 
     commands: Array  # (n + stride,), m: as they came, as far as they are known, relative to the start
-    residuals: Array  # (n,), m: of the physics model, as far as they are measured
-    # (n,), m: commands of the drive at these, as late as the command's expert takes them, and what they are before x_pb
-    late: Array
-    leads: Array
+    # (3, n), m, as far as it is measured: residuals of the physics model; commands of the drive, as late as the
+    # command's expert takes them; and what these are before x_pb
+    measured: Array
     repeats: Array  # (n,): how often each came before, as far as it was alike
     distances: Array  # (n,), m²: ``D_τ`` of the lags n … 1
     moved: float  # m²: ``S``
@@ -47,25 +44,24 @@ class Memory:
     @classmethod
     def init(cls, n: int, Np: int) -> "Memory":
         """Return a memory of ``n`` samples of a run at rest, for windows of ``Np``."""
-        return cls(np.zeros(n + max(1, Np // _UPDATES)), *np.zeros((5, n)), 0.0, 0)
+        return cls(np.zeros(n + max(1, Np // _UPDATES)), np.zeros((3, n)), np.zeros(n), np.zeros(n), 0.0, 0)
 
     def restart(self) -> "Memory":
         """Return the memory at the beginning of another run, at rest at its start, after a sample without residual.
 
         Commands that were known ahead and never measured are forgotten: each command stands beside its residual.
         """
-        n_measured, size = max(len(self.commands) - self.n_ahead, 0), len(self.residuals)
+        n_measured, size = max(len(self.commands) - self.n_ahead, 0), len(self.repeats)
         unknown = np.full(len(self.commands) - n_measured, self.commands[0])
         commands = np.concatenate((unknown, self.commands[:n_measured]))
-        late = np.append(self.late[1:], commands[-1])[:size] - commands[-1]
+        end = np.array([[0.0], [commands[-1]], [0.0]])
+        measured, repeats = np.hstack((self.measured, end))[:, 1:] - end, np.append(self.repeats, 0.0)[1:]
         commands = np.append(commands[1:], commands[-1]) - commands[-1]
-        kept = (self.residuals, self.leads, self.repeats)
-        residuals, leads, repeats = (np.append(one[1:], 0.0)[:size] for one in kept)  # size may be 0
-        return Memory(commands, residuals, late, leads, repeats, np.zeros(size), 0.0, 0)
+        return Memory(commands, measured, repeats, np.zeros(size), 0.0, 0)
 
     def append_commands(self, path: Array, n_known: int | None, Np: int) -> "Memory":
         """Return the memory that knows the first ``n_known`` commands of those to predict, ``(m,)``, m."""
-        n, new = len(self.residuals), path[self.n_ahead : n_known]
+        n, new = len(self.repeats), path[self.n_ahead : n_known]
         stride = len(self.commands) - n
         commands, distances = np.concatenate((self.commands, new)), self.distances.copy()
         gamma, moved, begin = math.exp(-stride / len(path)), self.moved, len(self.commands)
@@ -89,7 +85,7 @@ class Memory:
         ``n``: samples from the last measured to the last known command; ``before``: if a compensator plans, those that
         are compared before them.
         """
-        size, first = len(self.residuals), max(before, 1)
+        size, first = len(self.repeats), max(before, 1)
         if size < n + first:
             return 0, 0.0
         compared = np.maximum(self.distances, _SAME * self.moved if before else 0.0)
@@ -100,29 +96,25 @@ class Memory:
     def recalled(self, n: int, before: int = 0) -> "Recalled":
         """Return what is :meth:`found`, with the samples ``before`` it, and the last ones."""
         place, alike = self.found(n, before)
-        first, signals = max(before, 1), np.stack((self.residuals, self.late, self.leads))
+        first = max(before, 1)
         if place == 0:
             return Recalled(np.zeros((3, first + n)), np.zeros((3, first)), 0.0)
-        return Recalled(signals[:, place - first : place + n], signals[:, signals.shape[1] - first :], alike)
+        return Recalled(self.measured[:, place - first : place + n], self.measured[:, -first:], alike)
 
-    def remember(self, signals: Array, n: int, before: int = 0) -> "Memory":
-        """Return the memory with measured samples, ``(3, m)``, m: residuals, late commands, leads; others: as above."""
-        m, (place, alike) = signals.shape[1], self.found(n, before) if before else (0, 0.0)
-        known, repeats = np.stack((self.residuals, self.late, self.leads)), np.zeros(m)
-        if place:
-            repeats = alike * (self.repeats[place : place + m] + 1.0)
-            share = (1.0 - CONSTANTS.recall_share) * alike
-            kept = np.where(repeats < CONSTANTS.recall_repeats, 0.0, share)
-            signals = signals + kept * (known[:, place : place + m] - signals)
-        residuals, late, leads = np.hstack((known, signals))[:, m:]
-        repeats = np.append(self.repeats, repeats)[m:]
-        n_ahead = max(self.n_ahead - m, 0)
-        return replace(self, residuals=residuals, late=late, leads=leads, repeats=repeats, n_ahead=n_ahead)
+    def remember(self, measured: Array, n: int = 0, before: int = 0) -> "Memory":
+        """Return the memory with samples more, ``(3, m)``, m; ``n``, ``before``: behind a compensator, as above."""
+        m, (place, alike) = measured.shape[1], self.found(n, before) if before else (0, 0.0)
+        then, repeats = (self.measured, alike * (self.repeats + 1.0)) if place else (measured, np.zeros(m))
+        then, repeats = then[:, place : place + m], repeats[place : place + m]
+        kept = np.where(repeats < CONSTANTS.recall_repeats, 0.0, (1.0 - CONSTANTS.recall_share) * alike)
+        measured = np.hstack((self.measured, measured + kept * (then - measured)))[:, m:]
+        repeats, n_ahead = np.append(self.repeats, repeats)[m:], max(self.n_ahead - m, 0)
+        return replace(self, measured=measured, repeats=repeats, n_ahead=n_ahead)
 
 
 class Recalled(NamedTuple):
-    """Residuals, late commands and leads, rows, m."""
+    """What was measured, as in :class:`Memory`."""
 
-    then: Array  # (3, before + n): that are recalled
-    now: Array  # (3, before): the last ones
-    alike: float  # how they count
+    then: Array  # (3, before + n), m: what is recalled
+    now: Array  # (3, before), m: the last samples
+    alike: float  # how it counts

@@ -44,19 +44,12 @@ HSEP_ASSERT_WORDS(hsep_linearised, 18);
 #define LINEARISED_BEFORE 2   /* samples at rest before a change */
 #define LINEARISED_TOGETHER 4 /* samples of a recursion that are summed side by side */
 
-/* Weight in the stack with which what is recalled moves as HSEP_ARX_COMMAND answers; 0 for other experts. */
-static hsep_real linearised_recalled(hsep_averaged *model, hsep_int i)
-{
-    const hsep_real moves = hsep_averaged_recall(model)->moves * model->shares[HSEP_RECALL];
-    return HSEP_REGRESSIONS + i == HSEP_ARX_COMMAND ? moves : 0.0;
-}
-
 /* Weight in the stack of expert i of those that rows train; 0 if it knows nothing, or predicts another residual. */
 static hsep_real linearised_weight(hsep_averaged *model, hsep_int i, hsep_int kind)
 {
     const hsep_int expert = HSEP_REGRESSIONS + i;
     const int of_kind = hsep_averaged_kind_of(model, expert) == kind;
-    return model->predicted[expert] && of_kind ? model->shares[expert] + linearised_recalled(model, i) : 0.0;
+    return model->predicted[expert] && of_kind ? model->shares[expert] + hsep_averaged_moves(model, expert) : 0.0;
 }
 
 /* Experts whose disturbances a change passes through. */
@@ -273,11 +266,10 @@ static void hsep_linearised_at(
         const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
         const hsep_real of_model = linearised_weight(model, i, HSEP_MODEL_RESIDUAL);
         const hsep_real weight = of_model + linearised_weight(model, i, HSEP_COMMAND_RESIDUAL); /* one is 0 */
-        const hsep_real recalled = linearised_recalled(model, i);
-        const hsep_real *e_h = hsep_at_const(expert, expert->e_h), *at_zero = hsep_at_const(expert, expert->shrinkage);
-        const hsep_real *unshrunk = hsep_at_const(expert, expert->unshrunk);
+        const hsep_real recalled = hsep_averaged_moves(model, HSEP_REGRESSIONS + i);
+        const hsep_real *e = hsep_at_const(expert, expert->unshrunk), *e_h = hsep_at_const(expert, expert->e_h);
         for (hsep_int k = 0, j = n - 1; weight > 0.0 && k < n; k++, j--) { /* what shrinking and bounds leave of it */
-            const hsep_real left = unshrunk[j] == 0.0 ? at_zero[j] : e_h[j] / unshrunk[j];
+            const hsep_real left = e[j] == 0.0 ? hsep_at_const(expert, expert->shrinkage)[j] : e_h[j] / e[j];
             hsep_at(self, self->shrink)[i * n + k] = (weight - recalled) * left + recalled;
         }
         if (of_model > 0.0) {

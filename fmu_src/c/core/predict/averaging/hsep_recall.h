@@ -277,8 +277,8 @@ static inline hsep_real hsep_recall_begin(hsep_recall *self, hsep_real last, con
     return self->alike;
 }
 
-/* What is recalled for samples first ... last - 1, m, newest first. late, x_pb: (n + 1,) and (n,), m, commands as above,
- * and the physics model's response; bound, most: m, on what is recalled, and on the answer to other commands. */
+/* What is recalled for samples first ... last - 1, m, newest first. late, x_pb: (n,) m, commands as above, and the
+ * physics model's response; bound, most: m, on what is recalled, and on the answer to other commands. */
 static inline void hsep_recall_predict(
     hsep_recall *self, const hsep_real weights[], const hsep_real late[], const hsep_real x_pb[], hsep_real bound,
     hsep_real most, hsep_int first, hsep_int last, hsep_real recalled[])
