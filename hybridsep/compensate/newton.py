@@ -111,11 +111,6 @@ class PlanModel:
         """Whether it has learned how the drive's disturbances act."""
         return STATIC in self._solved
 
-    @property
-    def is_trained(self) -> bool:
-        """Whether it has weights of earlier runs."""
-        return self._model.doubts
-
     def outgrows(self, factor: float) -> bool:
         """Return whether the unmodified commands, and the physics model under them, are faster than what is learned.
 

@@ -339,7 +339,7 @@ class Recall(Expert):
         if static.n_known is None or ARX_COMMAND not in solved:
             return 0.0
         one, u = solved[ARX_COMMAND], np.minimum(np.arange(1, n + 1) / PULSE, 1.0)
-        pulse = (u * (1.0 - u)) ** 3
+        pulse = u * (1.0 - u) * u * (1.0 - u) * u * (1.0 - u)
         own, _ = static.discrete.forced_response(static.discrete.rest(), pulse)
         drive = lfilter(one.solution.weights[1 : one.n_static], [1.0], first_differences(pulse))
         e, _ = _recursion(one.lag_weights, drive, np.zeros(len(one.lag_weights)))

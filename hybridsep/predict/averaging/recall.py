@@ -25,6 +25,8 @@ _ALIKE = 1e-100  # square of a change, m², that counts as 0: sums of smaller on
 
 PULSE = 14  # samples of a change of the command that answers to it are compared by: what a plan may ask for at once
 
+_ROWS = 3  # of what was measured
+
 _SAME = 1e-5  # distance, relative to the changes', below which stretches under a compensator are the same
 
 
@@ -44,7 +46,7 @@ class Memory:
     @classmethod
     def init(cls, n: int, Np: int) -> "Memory":
         """Return a memory of ``n`` samples of a run at rest, for windows of ``Np``."""
-        return cls(np.zeros(n + max(1, Np // _UPDATES)), np.zeros((3, n)), np.zeros(n), np.zeros(n), 0.0, 0)
+        return cls(np.zeros(n + max(1, Np // _UPDATES)), np.zeros((_ROWS, n)), np.zeros(n), np.zeros(n), 0.0, 0)
 
     def restart(self) -> "Memory":
         """Return the memory at the beginning of another run, at rest at its start, after a sample without residual.
@@ -98,7 +100,7 @@ class Memory:
         place, alike = self.found(n, before)
         first = max(before, 1)
         if place == 0:
-            return Recalled(np.zeros((3, first + n)), np.zeros((3, first)), 0.0)
+            return Recalled(np.zeros((_ROWS, first + n)), np.zeros((_ROWS, first)), 0.0)
         return Recalled(self.measured[:, place - first : place + n], self.measured[:, -first:], alike)
 
     def remember(self, measured: Array, n: int = 0, before: int = 0) -> "Memory":

@@ -35,9 +35,10 @@ typedef struct {
     hsep_int distances;  /* (size,) m2, of the lags 1 ... size */
     hsep_int found;      /* lag that the window is recalled with, */
     hsep_real alike;     /* and how much that counts */
-    hsep_int run_in;     /* samples before it in which HSEP_ARX_COMMAND's answer to other commands is run in */
+    hsep_int p;          /* lags of HSEP_ARX_COMMAND, */
+    hsep_int run_in;     /* and samples before it in which its answer to other commands is run in */
     hsep_real own;       /* m2, how fast the physics model answers to a pulse, */
-    hsep_real moves;     /* and share of that expert's answer, if it is faster, in what is recalled */
+    hsep_real moves;     /* and share of HSEP_ARX_COMMAND's, if it is faster, in what is recalled */
     hsep_real offset;    /* m, by which it is moved to the last residual, which fades */
     hsep_int fade;       /* (n,) share of that which is left */
     hsep_int then;       /* (n,) m, residuals that are recalled */
@@ -45,7 +46,7 @@ typedef struct {
     hsep_int run;        /* (n + run_in + p,) m, and the answer to them */
     hsep_int physics;    /* G_pb */
 } hsep_recall;
-HSEP_ASSERT_WORDS(hsep_recall, 31);
+HSEP_ASSERT_WORDS(hsep_recall, 32);
 
 static inline hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predictor_parameters *parameters)
 {
@@ -63,8 +64,9 @@ static inline hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predic
     self->repeats = hsep_take(&end, kept);
     self->late = hsep_take(&end, kept);
     self->leads = hsep_take(&end, kept);
+    self->p = HSEP_AVERAGING_LAGS_OF_COMMAND;
     self->run_in = self->same > 0.0 ? self->n / 2 : 0;
-    const hsep_real run = n + (hsep_real)(self->run_in + HSEP_AVERAGING_LAGS_OF_COMMAND);
+    const hsep_real run = n + (hsep_real)(self->run_in + self->p);
     self->fade = hsep_take(&end, n);
     self->then = hsep_take(&end, n);
     self->increments = hsep_take(&end, run);
@@ -104,7 +106,7 @@ static inline void recall_compare(hsep_recall *self, hsep_int first, hsep_int la
         recall_add(distances + (begin - 1), changes + place, count, now, self->fading);
         begin += count;
     }
-    const hsep_int before = self->same > 0.0 ? self->run_in + HSEP_AVERAGING_LAGS_OF_COMMAND : 0;
+    const hsep_int before = self->same > 0.0 ? self->run_in + self->p : 0;
     const hsep_int begin = first > self->n ? first - 1 : self->n, end = hsep_min(last, self->size - before) - 1;
     if (is_last && begin < end && distances[self->lag - 1] > self->same * self->moved) { /* the shortest of equals */
         const hsep_int found = begin + hsep_place_of_least(distances + begin, end - begin, self->same * self->moved);
@@ -163,7 +165,7 @@ static inline void hsep_recall_remember(
 /* Answer of HSEP_ARX_COMMAND at place j to the increments up to there. weights: of increments and of lags. */
 static inline void recall_answer(hsep_recall *self, const hsep_real weights[], hsep_int j)
 {
-    const hsep_int p = HSEP_AVERAGING_LAGS_OF_COMMAND;
+    const hsep_int p = self->p;
     hsep_real *run = hsep_at(self, self->run);
     const hsep_real drive = hsep_dot(weights, hsep_at(self, self->increments) + j, p + 1);
     run[j] = hsep_recur(drive, weights + p + 1, run + j + 1, p);
@@ -198,7 +200,7 @@ static inline void recall_follow(recall_speed *self, hsep_real x)
 /* The same of HSEP_ARX_COMMAND's answer to the pulse. */
 static inline hsep_real recall_square(hsep_recall *self, const hsep_real weights[])
 {
-    const hsep_int n = self->n, p = HSEP_AVERAGING_LAGS_OF_COMMAND;
+    const hsep_int n = self->n, p = self->p;
     recall_speed speed = {0};
     hsep_zero(hsep_at(self, self->increments) + n, p);
     hsep_zero(hsep_at(self, self->run) + n, p);
@@ -241,7 +243,7 @@ static inline hsep_real hsep_recall_begin(hsep_recall *self, hsep_real last, con
     const hsep_real *residuals = hsep_at_const(self, self->residuals), *late = hsep_at_const(self, self->late);
     const hsep_real *leads = hsep_at_const(self, self->leads);
     const hsep_real tolerated = HSEP_AVERAGING_RECALL_TOLERANCE * HSEP_AVERAGING_RECALL_TOLERANCE * self->moved;
-    const hsep_int n = self->n, p = HSEP_AVERAGING_LAGS_OF_COMMAND, before = self->run_in;
+    const hsep_int n = self->n, p = self->p, before = self->run_in;
     hsep_real *then = hsep_at(self, self->then), *fade = hsep_at(self, self->fade);
     hsep_real *run = hsep_at(self, self->run), *increments = hsep_at(self, self->increments);
     hsep_zero(then, n);
