@@ -358,7 +358,7 @@ class Recall(Expert):
 
     def _change(self, at: ExpertWindow, first: int) -> Array:
         """Return what the residual changes by as the commands are others, from the last sample on, ``(1 + n,)``, m."""
-        static, (then, now, _), one = at.model.static, at.recalled, at.solved[ARX_COMMAND]
+        static, (then, now, *_), one = at.model.static, at.recalled, at.solved[ARX_COMMAND]
         n, p = len(at.window.x_d), static.command.p
         late = static.command.late(at.model.run.static.x_d, at.window.x_d)
         since = np.hstack((now, np.stack((np.zeros(n), late, late - at.window.x_pb)))) - then[:, : first + n]

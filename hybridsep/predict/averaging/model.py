@@ -268,7 +268,7 @@ class AveragedModel:
         x, path, held = window.x_pb, window.raw_commands, like.predictions if like else {}
         memory = like.memory if like else self.run.memory.append_commands(path, self.static.n_known, self.settings.Np)
         recalled = memory.recalled(len(path), RECALL.before(self.static, len(path)))
-        moves = like.moves if like else RECALL.moves(self.static, solved, len(path))
+        moves = like.moves if like else recalled.same * RECALL.moves(self.static, solved, len(path))
         of_physics = of_physics or self.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, of_physics.rows, {}, recalled, moves)
         if STATIC in solved:
@@ -282,7 +282,7 @@ class AveragedModel:
         for one in EXPERTS:
             stacked[one.place] = one.forecast(at)
         others, weights = self.learned.stack.others(), self.learned.stack.weights
-        (*_, alike), recall = at.recalled, RECALL.place
+        alike, recall = recalled.alike, RECALL.place
         shares = weights + weights[recall] * (1.0 - alike) * others
         shares[recall] = weights[recall] * alike
         stacked[recall] = alike * stacked[recall] + (1.0 - alike) * (others @ stacked)

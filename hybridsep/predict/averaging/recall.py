@@ -100,8 +100,9 @@ class Memory:
         place, alike = self.found(n, before)
         first = max(before, 1)
         if place == 0:
-            return Recalled(np.zeros((_ROWS, first + n)), np.zeros((_ROWS, first)), 0.0)
-        return Recalled(self.measured[:, place - first : place + n], self.measured[:, -first:], alike)
+            return Recalled(np.zeros((_ROWS, first + n)), np.zeros((_ROWS, first)), 0.0, 0.0)
+        same = _SAME * self.moved / max(float(self.distances[place]), _SAME * self.moved, _ALIKE)
+        return Recalled(self.measured[:, place - first : place + n], self.measured[:, -first:], alike, same)
 
     def remember(self, measured: Array, n: int = 0, before: int = 0) -> "Memory":
         """Return the memory with samples more, ``(3, m)``, m; ``n``, ``before``: behind a compensator, as above."""
@@ -119,4 +120,5 @@ class Recalled(NamedTuple):
 
     then: Array  # (3, before + n), m: what is recalled
     now: Array  # (3, before), m: the last samples
-    alike: float  # how it counts
+    alike: float  # how it counts, 0 … 1,
+    same: float  # and how far its path is the same, so that commands of the drive differ by what was planned, 0 … 1

@@ -262,6 +262,8 @@ static inline hsep_real hsep_recall_begin(hsep_recall *self, hsep_real last, con
     if (weights != NULL) {
         const hsep_real square = recall_square(self, weights);
         self->moves = self->own < square && square < INFINITY ? 1.0 - self->own / square : 0.0;
+        /* as far as the path is the same, so that commands differ by what was planned */
+        self->moves *= self->same * self->moved / hsep_fmax(distance, self->same * self->moved);
     }
     if (self->moves > 0.0) {
         for (hsep_int i = 0; i < before + p; i++) {
