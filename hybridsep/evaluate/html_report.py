@@ -19,8 +19,6 @@ PHYSICS, HOLD, HYBRID = "#d95f02", "#7f7f7f", "#1b6ca8"  # colours of the predic
 _HEIGHT, _HEIGHT_OF_SEVERAL = 340, 255  # height of the only panel, and of one of several, px
 _FONT_SIZE = 13  # size of all text of a chart, px
 
-_SPACING = 0.08  # between panels, relative to the chart's height
-
 _AXES: dict[str, Any] = {"gridcolor": "#e8ecf0", "zeroline": False, "automargin": True}
 _TITLE: dict[str, Any] = {"font": {"size": _FONT_SIZE}, "standoff": 8}
 _LAYOUT: dict[str, Any] = {
@@ -102,11 +100,9 @@ class Line:
                 np.concatenate([[], *((*there[i:j], *back[i:j][::-1], np.nan) for i, j in ends)])
                 for there, back in ((x, x), (y, upper[0]))
             )
-        style |= {"name": self.name, "legendgroup": self.name, "showlegend": bool(self.name) and is_new}
-        style |= {
-            name: {"dtype": "f8", "bdata": b64encode(values.astype("<f8").tobytes()).decode()}
-            for name, values in (("x", x), ("y", y))
-        }
+        data = [{"dtype": "f8", "bdata": b64encode(one.astype("<f8").tobytes()).decode()} for one in (x, y)]
+        style |= {"name": self.name, "legendgroup": self.name, "x": data[0], "y": data[1]}
+        style["showlegend"] = bool(self.name) and is_new
         panel = str(self.panel + 1) if self.panel else ""
         return dict(sorted(style.items())) | {"type": "scatter", "xaxis": f"x{panel}", "yaxis": f"y{panel}"}
 
@@ -125,11 +121,11 @@ class Chart:
 
     def figure(self) -> dict[str, Any]:
         """Return it for plotly.js, at once: by plotly's figures it takes ten times as long."""
-        n, names = len(self.y_labels), [line.name for line in self.lines]
+        n, names, spacing = len(self.y_labels), [line.name for line in self.lines], 0.08
         layout: dict[str, Any] = {"template": {"data": {"scatter": [{"type": "scatter"}]}}}
-        height = (1.0 - _SPACING * (n - 1)) / n
+        height = (1.0 - spacing * (n - 1)) / n
         for i, label in enumerate(self.y_labels):
-            panel, low = str(i + 1) if i else "", (n - 1 - i) * (height + _SPACING)
+            panel, low = str(i + 1) if i else "", (n - 1 - i) * (height + spacing)
             below = {} if i == n - 1 else {"matches": f"x{n}", "showticklabels": False}
             for name, anchor, domain, more, text, log in (
                 ("x", "y", [0.0, 1.0], below, {} if below else {"text": self.x_label}, self.x_log),
@@ -137,9 +133,8 @@ class Chart:
             ):
                 axis = {"anchor": f"{anchor}{panel}", "domain": domain, **more, "title": _TITLE | text, **_AXES}
                 layout[f"{name}axis{panel}"] = axis | ({"type": "log", "dtick": 1} if log else {})
-        layout |= {**_LAYOUT, "height": _HEIGHT if n == 1 else n * _HEIGHT_OF_SEVERAL}
         data = [line.trace(is_new=line.name not in names[:i]) for i, line in enumerate(self.lines)]
-        return {"data": data, "layout": layout}
+        return {"data": data, "layout": layout | _LAYOUT | {"height": _HEIGHT if n == 1 else n * _HEIGHT_OF_SEVERAL}}
 
 
 @dataclass

@@ -41,8 +41,7 @@ class FirstOrderLag:
 
 def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
     """Return the lag that fits commanded and measured positions ``(n,)``, m, NaN where missing, best."""
-    each = [(x_d, x, ~np.isnan(x)) for x_d, x in recordings]
-    known = [(x_d, x, slice(None) if there.all() else there) for x_d, x, there in each if there.any()]
+    known = [(x_d, x, slice(None) if there.all() else there) for x_d, x in recordings if (there := ~np.isnan(x)).any()]
 
     def misfit(log_tau: float, late: int) -> float:
         lag = FirstOrderLag(math.exp(log_tau), late)

@@ -50,9 +50,7 @@ class ResidualScale:
 
     def follow(self, residuals: Array, level: float) -> ResidualScale:
         """Return the scale with another window of residuals, ``(n,)``, m, n ≥ 1; ``level``, m: of their run."""
-        mean_square = move = mean(residuals**2)
-        if level:
-            move = mean((residuals - level) ** 2)
+        mean_square, move = mean(residuals**2), mean((residuals - level) ** 2)
         largest = max(self.largest, float(np.abs(residuals).max()))
         return ResidualScale(max(self.largest_square, mean_square), max(self.largest_move, move), largest)
 
