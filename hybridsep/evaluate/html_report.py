@@ -83,8 +83,8 @@ class Line:
         )
         return [replace(self, x=x, y=y, upper=upper) for x, y, upper in zip(*rows, strict=True) if len(x)]
 
-    def trace(self, *, is_new: bool) -> dict[str, Any]:
-        """Return it for plotly.js; ``is_new``: whether it is the first one of its name."""
+    def trace(self, *, is_named: bool) -> dict[str, Any]:
+        """Return it for plotly.js; ``is_named``: whether it stands in the legend, as the first one of its name."""
         edges = (self.y,) if self.upper is None else (self.y, self.upper)
         places = drawn_places(600, *edges)  # the widest chart has 900 pixels
         x, y, *upper = (np.asarray(values, dtype=np.float64)[places] for values in (self.x, *edges))
@@ -101,8 +101,7 @@ class Line:
                 for there, back in ((x, x), (y, upper[0]))
             )
         data = [{"dtype": "f8", "bdata": b64encode(one.astype("<f8").tobytes()).decode()} for one in (x, y)]
-        style |= {"name": self.name, "legendgroup": self.name, "x": data[0], "y": data[1]}
-        style["showlegend"] = bool(self.name) and is_new
+        style |= {"name": self.name, "legendgroup": self.name, "showlegend": is_named, "x": data[0], "y": data[1]}
         panel = str(self.panel + 1) if self.panel else ""
         return dict(sorted(style.items())) | {"type": "scatter", "xaxis": f"x{panel}", "yaxis": f"y{panel}"}
 
@@ -133,7 +132,7 @@ class Chart:
             ):
                 axis = {"anchor": f"{anchor}{panel}", "domain": domain, **more, "title": _TITLE | text, **_AXES}
                 layout[f"{name}axis{panel}"] = axis | ({"type": "log", "dtick": 1} if log else {})
-        data = [line.trace(is_new=line.name not in names[:i]) for i, line in enumerate(self.lines)]
+        data = [line.trace(is_named=line.name not in ("", *names[:i])) for i, line in enumerate(self.lines)]
         return {"data": data, "layout": layout | _LAYOUT | {"height": _HEIGHT if n == 1 else n * _HEIGHT_OF_SEVERAL}}
 
 
