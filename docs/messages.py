@@ -138,6 +138,11 @@ FINDINGS: Mapping[str, Explanation] = {
         "A run rejects what is out of reach (`averaging = true`); a fit identifies and judges with every sample: leave "
         "wrong measured positions blank in the file.",
     ),
+    "begins anew": Explanation(
+        "The measured position leaps from one end of its range to the other between two samples, as the position of a "
+        "modulo axis in mm does, or a counter of few bits. Whole turns and counters of 16 bits are recognised.",
+        "Unwrap both positions before, by the length after which they begin anew, as your controller must do too.",
+    ),
     "repeated samples": Explanation(
         "The position was sampled more slowly than the log was written, and unevenly.",
         "Record at the rate of the position's own source.",
@@ -147,12 +152,12 @@ FINDINGS: Mapping[str, Explanation] = {
         "Look at the positions in the report. An axis that sticks needs none.",
     ),
     "clipped": Explanation(
-        "The same, at one end of the measured range: the recorder's range may end there, or friction or load stops the "
-        "axis.",
+        "The measured position stands still at one end of its range while its command goes on: the recorder's range "
+        "may end there, or friction or load stops the axis.",
         "Look at the positions in the report. Record with a larger range where it was the recorder.",
     ),
     "late": Explanation(
-        "The measured position is more than 0.1 s behind its command, drive, dead time and recorder together.",
+        "The measured position lags its command by more than 0.1 s in all: drive, dead time and recorder.",
         "None, if the axis is as slow. Where the recorder is known to be late by whole samples, give `--delay`; where "
         "the controller gets the measurement as late, `--measurement_delay`.",
     ),

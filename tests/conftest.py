@@ -28,7 +28,7 @@ import pytest
 from built_once import SHARED_BUILDS, BuiltFmus, built_once
 from command_line import Run
 from properties import LEFT_OUT, take_profile
-from quick_fits import without_larger_structures, without_other_settings
+from quick_fits import with_short_references, without_larger_structures, without_other_settings
 
 sys.dont_write_bytecode = False  # of this process too
 
@@ -68,6 +68,12 @@ def quick_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` try small structures and the default settings."""
     without_larger_structures(monkeypatch)
     without_other_settings(monkeypatch)
+
+
+@pytest.fixture
+def short_references(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let FMUs that a test builds have short reference runs."""
+    with_short_references(monkeypatch)
 
 
 @pytest.fixture(autouse=True)

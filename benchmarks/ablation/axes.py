@@ -24,7 +24,7 @@ from hybridsep.base.metrics import coverage, rms
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.evaluate.peers import Piece, predict_peers
-from hybridsep.fitting.choice import with_window
+from hybridsep.fitting.lags import with_window
 from hybridsep.identify.model import IdentifiedModel
 from hybridsep.identify.operation import identify_operation, unit_gain_model
 from hybridsep.logs.log import read_log

@@ -36,10 +36,11 @@ class Case:
     windows: int  # windows that are replayed
     warm: bool = False  # whether it begins with what was learned in a run before
     recall: int = PredictorSettings().recall  # samples of the memory
+    late: int = 0  # samples by which measurements are said to be late
 
 
 def _predictor(case: Case) -> HybridPredictor:
-    settings = PredictorSettings(Np=case.Np, p=case.p, q=3, recall=case.recall)
+    settings = PredictorSettings(Np=case.Np, p=case.p, q=3, recall=case.recall, measurement_delay=case.late)
     return HybridPredictor(load_machine("spring_mass_damper").model, settings)
 
 

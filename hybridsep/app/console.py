@@ -128,9 +128,8 @@ def print_contours(figures: Mapping[str, Mapping[str, float]], as_json: bool, ti
 
 def print_written(*paths: Path | None) -> None:
     """Print the names of files that were written, None being none."""
-    for path in paths:
-        if path is not None:
-            console.print(f"wrote {path}", soft_wrap=True)
+    for path in filter(None, paths):
+        console.print(f"wrote {path}", soft_wrap=True)
 
 
 def print_built(archives: Iterable[Path]) -> None:

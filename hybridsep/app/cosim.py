@@ -81,7 +81,8 @@ def cosim(
     trajectory, command, of_file = _command(trajectory, machine, axis, unit)
     shown = shown_of(of_file or axis.log.unit or "", axis.unit)
     _check_pair(axis, model, predictor, plant, weights, entries or ())
-    inputs = {"trajectory": _file(trajectory), "predictor": predictor, "plant": plant, "saved predictor": weights}
+    file = None if trajectory in options.TRAJECTORIES else trajectory
+    inputs = {"trajectory": file, "predictor": predictor, "plant": plant, "saved predictor": weights}
     outputs = (("--out", out, RUNS), ("--figure", figure, (".png",)))
     check_outputs(outputs, {"machine file": machine_path(machine), **inputs}, force=force)
     title = f"{' and '.join(path.name for path in (predictor, plant) if path is not None) or axis.title}, {trajectory}"
@@ -201,10 +202,6 @@ def _path_limits(axis: Machine) -> tuple[float, ...]:
     return tuple(most / more for most, more in zip(astuple(drive), MARGINS.tolist(), strict=True))
 
 
-def _file(trajectory: str) -> str | None:
-    return None if trajectory in options.TRAJECTORIES else trajectory
-
-
 def _command(trajectory: str | None, machine: str, axis: Machine, unit: str | None) -> tuple[str, Array, str]:
     """Return the trajectory that is meant, its samples at the machine's interval, and the unit of its file or "".
 
@@ -283,7 +280,8 @@ def system(
     check_system(axis, compensate=compensate, ssp=ssp)
     trajectory, command, _ = _command(trajectory, machine, axis, unit)
     check_available(target or ("host",))
-    inputs = {"machine file": machine_path(machine), "trajectory": _file(trajectory), "saved predictor": weights}
+    file = None if trajectory in options.TRAJECTORIES else trajectory
+    inputs = {"machine file": machine_path(machine), "trajectory": file, "saved predictor": weights}
     check_outputs([("--out", out, (".ssp",))], inputs, force=force)
     given: dict[str, Any] = {"compensate": compensate, "targets": target or None, "weights": weights, "ssp": ssp}
     with progress_bar(False) as advance:

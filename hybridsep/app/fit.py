@@ -4,9 +4,9 @@ import gc
 import math
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -16,6 +16,8 @@ from . import options
 
 if TYPE_CHECKING:
     from ..fitting.fit import Fit
+
+_Parsed = TypeVar("_Parsed")
 
 
 @options.takes_reading
@@ -79,8 +81,10 @@ def fit(
     machine = checked_name(name) if name else machine_name(logs[0], reading.axis)
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     check_outputs((), inputs)
-    lags, ahead = [] if p is None else _numbers(p), None if look_ahead is None else _seconds(look_ahead)
-    gains = None if cascade is None else _gains(cascade)
+    numbers = _parsed(p, _numbers, "--p must be whole numbers with commas") or []
+    lags = [PARAMETERS["p"].checked(one, "--p") for one in numbers]
+    ahead = _parsed(look_ahead, _seconds, "--look-ahead must be a time with its unit, such as 60ms or 0.06s")
+    gains = _parsed(cascade, _gains, "--cascade must be NAME=VALUE with commas, each a number")
     used = different_logs([read_log(path, **reading.arguments()) for path in logs])
     # What computes takes seconds to import: a log that cannot be read is said before
     from ..fitting.build import fit_files
@@ -111,33 +115,26 @@ def fit(
     console.print("\n".join(_next_steps(result, files)), soft_wrap=True, highlight=False)
 
 
-def _numbers(text: str) -> list[int]:
-    """Return the numbers of lags of an option, ``5,10,50``; ParameterError if one is none that ``p`` may be."""
+def _parsed(text: str | None, parse: Callable[[str], _Parsed], must: str) -> _Parsed | None:
+    """Return what an option's text says, None without one; ParameterError if it cannot be parsed."""
     try:
-        numbers: list[Any] = list(map(int, text.split(",")))
+        return None if text is None else parse(text)
     except ValueError:
-        raise ParameterError(f"--p must be whole numbers with commas, got {text!r}") from None
-    return [PARAMETERS["p"].checked(one, "--p") for one in numbers]
+        raise ParameterError(f"{must}, got {text!r}") from None
+
+
+def _numbers(text: str) -> list[int]:
+    return list(map(int, text.split(",")))
 
 
 def _gains(text: str) -> dict[str, float]:
-    """Return the gains of an option, ``Kp=162,Kv=0.5``; ParameterError if one has no number."""
-    pairs = [one.partition("=") for one in text.split(",")]
-    try:
-        return {gain.strip(): float(value) for gain, _, value in pairs}
-    except ValueError:
-        raise ParameterError(f"--cascade must be NAME=VALUE with commas, each a number, got {text!r}") from None
+    return {gain.strip(): float(value) for gain, _, value in (one.partition("=") for one in text.split(","))}
 
 
 def _seconds(text: str) -> float:
-    """Return the seconds of a time, ``60ms`` or ``0.06s``; ParameterError if it is none, or has no unit."""
-    number, factor = (text[:-2], 1e-3) if text.endswith("ms") else (text[:-1] if text.endswith("s") else "", 1.0)
-    try:
-        seconds = factor * float(number)
-    except ValueError:
-        seconds = math.nan
+    seconds = 1e-3 * float(text[:-2]) if text.endswith("ms") else float(text[:-1] if text.endswith("s") else "")
     if not 0.0 < seconds < math.inf:
-        raise ParameterError(f"--look-ahead must be a time with its unit, such as 60ms or 0.06s, got {text!r}")
+        raise ValueError(text)
     return seconds
 
 

@@ -103,12 +103,8 @@ class ReadingOptions:
         given = {"T_s": self.T_s, "delay": self.delay, "resample": self.resample}
         if machine is None:
             return {**given, "columns": columns, "unit": self.unit, "axis": self.axis}
-        own = machine.log
-        # with a sampling interval there may be no times, and an error is in the place of a position
-        left = ("t" if self.T_s is not None else "", ("x_d" if self.x else "x") if self.error else "")
-        names = {role: column for role, column in own.columns.items() if role not in left}
-        own_values = {"unit": self.unit or own.unit, "axis": self.axis or own.axis}
-        return {**given, **own_values, "columns": {**names, **columns}}
+        own, names = machine.log, machine.log.columns_beside(columns, self.T_s)
+        return {**given, "columns": names, "unit": self.unit or own.unit, "axis": self.axis or own.axis}
 
 
 def takes_reading(command: Callable[..., None]) -> Callable[..., None]:

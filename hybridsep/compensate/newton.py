@@ -1,20 +1,20 @@
 """Plan on the averaged model, by Newton steps that follow the slope of its disturbances.
 
-``min ‖w (x_d − x_h(x_d + δ))‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits, where the weights ``w`` of the errors
-fall to the end of a plan (``splines.py``), and where ``x_h`` is not affine in ``δ``:
-friction that follows the command changes its sign with the command's velocity. One to three Gauss-Newton steps begin at
-the remainder of the last plan: each solves the quadratic programme of the model linearised where the last one ended,
-friction over as large a change of velocity as the last step made, and goes to its minimum, or less far if only that
-lowers the cost; the next window goes on from there. The first samples of a plan follow the last plan, and the plan is
-made while they act; the steps of the solver are limited, so that the work fits into these samples. Predictions are
-shrunk by their variance, so where the model knows nothing the plan is the physics model's.
+``min ‖w (x_d − x_h(x_d + δ))‖² + jerk_weight·‖D³ δ‖²`` within the drive's limits. The weights ``w`` of the errors fall
+to the end of a plan (``splines.py``), and ``x_h`` is not affine in ``δ``: friction that follows the command changes its
+sign with the command's velocity. One to three Gauss-Newton steps begin at the remainder of the last plan. Each solves
+the quadratic programme of the model linearised where the last one ended, with the slope of friction over as large a
+change of velocity as the last step made, and goes to its minimum, or less far if only that lowers the cost; the next
+window goes on from there. The first samples of a plan follow the last one, and the plan is made while they act; the
+solver's steps are limited, so that the work fits into these samples. Predictions are shrunk by their variance, so where
+the model knows nothing the plan is the physics model's.
 
 The slope at given commands is ``sech²(v/v_i)`` for friction and ``2|x|`` for stiffness. Stop operators, the weights of
 the experts and of the stack, and the shrinking by the variance, are held constant:
 
-``∂x_h = (1 − π_A) G_pb + π_L ∂f_L + π_S ∂f_S + π_A ∂x_A``
+``∂x_h = (1 − π_c) G_pb + Σ_i π_i ∂f_i + π_c ∂x_c``
 
-A is ``arx_command``, linear and time-invariant: its features are increments and lags of the command. L and S are
+``c`` is ``arx_command``, linear and time-invariant: its features are increments and lags of the command. ``i`` are
 ``arx_residual`` and ``static``; ``fresh_start`` counts as the expert whose counterpart it is.
 """
 
@@ -38,7 +38,7 @@ _OWN_REACH = 1e-3
 """Change of velocity, relative to the velocity scale, that slopes of the user's own disturbances are taken over where
 the friction's is the tangent."""
 
-_APART = 4  # samples after the window that share the variance of the first one's features
+_VARIANCE_STRIDE = 4  # samples after the window that share the variance of the first one's features
 
 
 class DisturbanceSlopes(NamedTuple):
@@ -92,12 +92,12 @@ class PlanModel:
         window = self._window(x_d)
         self.scales, of_physics = model.scales_of(window)
         self._solved = model.solved(self.scales)
-        counts = np.arange(len(late) + len(x_d))
-        beyond = counts[len(late) + model.settings.Np :]
-        beyond -= np.arange(len(beyond)) % _APART
+        rows = np.arange(len(late) + len(x_d))
+        beyond = rows[len(late) + model.settings.Np :]
+        beyond -= np.arange(len(beyond)) % _VARIANCE_STRIDE
         # Prediction under ``x_d``, whose variances all others have.
         self.of_previous_plan = model.forecast_by(
-            *(self._solved, window, self.scales), counts=counts, of_physics=of_physics
+            *(self._solved, window, self.scales), variance_rows=rows, of_physics=of_physics
         )
 
     def _window(self, x_d: Array) -> ResidualWindow:

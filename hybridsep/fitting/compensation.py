@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..base.errors import FmuError, SignalError
-from ..base.metrics import ErrorSize, largest, rms
+from ..base.metrics import ErrorSize, rms
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, CompensatorSettings
 from ..base.signals import Array
 from ..compensate.planning import FASTER
@@ -90,7 +90,6 @@ class LookAheads:
     off: float  # RMS of the error without compensation, m
     duration: float  # of the stretch, s
     T_s: float  # s
-    is_rough: bool = False  # whether the command's own jerk is above its limit: plans past a preview may run away
 
     def figures(self, shown: DisplayUnits) -> tuple[str, list[str], list[list[str]]]:
         """Return title, head and rows of a table."""
@@ -123,7 +122,7 @@ class LookAheads:
         least = least_look_ahead(self.T_s)
         enough = (one.preview for one in self.tried if one.preview >= least and self.longer(one) is None)
         found = next(enough, self.chosen)
-        return found if 2 * found <= self.chosen and not self.is_rough else self.chosen
+        return found if 2 * found <= self.chosen else self.chosen
 
     def lines(self) -> list[str]:
         """Return the look-ahead that is advised, and why, in words; empty where the machine's is as good as any."""
@@ -377,8 +376,7 @@ class Stretch:
                 and rms(self.expected(replace(settings, **{name: value}), Np).compensated) < (1.0 - _GAIN) * left
             ]
             tried.append(Ahead(preview, left, bound, tuple(binds)))
-        is_rough = own.limits is not None and largest(np.diff(found.x_d, 3)) > own.limits.jerk * known.T_s**3
-        return LookAheads(tuple(tried), chosen, self.off, len(found.x_d) * known.T_s, known.T_s, is_rough)
+        return LookAheads(tuple(tried), chosen, self.off, len(found.x_d) * known.T_s, known.T_s)
 
 
 def _expected(trial: Trial, compensator: CompensatorSettings, recordings: Sequence[Recording]) -> Expected:

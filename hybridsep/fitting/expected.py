@@ -1,8 +1,8 @@
 """Tracking error to be expected of a compensator on recorded commands: an estimate before anything is compensated.
 
 The drive is taken for ``x = G_pb x_dm + r``: the identified model, and the residual ``r`` as it was recorded. The
-compensator plans and learns on it in closed loop. That ``r`` would change with the command is left out; friction does
-so where a modified command turns elsewhere.
+compensator plans and learns on it in closed loop. In truth ``r`` would change with the command, as friction does where
+a modified command turns elsewhere; this is neglected.
 """
 
 from collections import deque

@@ -34,9 +34,9 @@ from ..predict.window import Prediction
 from . import report as sections
 from .advice import Judged, advice_on, settling_words
 from .build import fit_files, sha256_of, write_commands
-from .choice import Tried, choose_settings, period_finding, settings_to_try, with_window
 from .compensation import Tracking, expected_tracking, taught
 from .identified_plant import IdentifiedPlant, commands_to_try, identified_plant
+from .lags import Tried, choose_settings, period_finding, settings_to_try, with_window
 from .limits import LIMITS_WORDS, drive_limits, estimated_limits
 from .replay import Recording, beginnings, replay, split_log
 

@@ -1,8 +1,8 @@
 """Plant that a fit leaves to try with: modes, friction and stiffness, fitted together to the log (output error).
 
-``x = G (x_d − d)`` with ``d = f·tanh(v_d/v_friction) + κ·x·|x|``, from the identified model on. It is kept where it is
-better on the last third of the training samples, else the identified model is the plant. It is no measurement:
-the compensator has features for just these disturbances, so results on this plant are optimistic.
+``x = G (x_d − d)`` with ``d = f·tanh(v_d/v_friction) + κ·x·|x|``; the fit starts at the identified model, which stays
+the plant unless the fitted one is better on the last third of the training samples. Results on this plant are
+optimistic: the compensator has features for just these disturbances.
 """
 
 import math

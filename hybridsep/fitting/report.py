@@ -17,7 +17,7 @@ from ..logs.checks import Finding
 from ..logs.log import Log
 from ..logs.units import stated_unit
 from .advice import OF_ITSELF, Judged, advice_on, extent, peers_in_words
-from .choice import WORTH, Tried
+from .lags import WORTH, Tried
 
 _NAMES = ("physics model", "hold the last residual", "hybrid")  # names of what a replay predicts by
 _COLOURS = (PHYSICS, HOLD, HYBRID)  # their colours

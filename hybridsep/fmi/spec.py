@@ -1,4 +1,4 @@
-"""An FMU before it is an archive: a machine on its way into one, with all that the files of the archive say of it."""
+"""Specification of an FMU before it is built: its machine, model and flavour, and what its files say of them."""
 
 import hashlib
 import json
@@ -33,7 +33,7 @@ _TITLES = {
 
 @dataclass(frozen=True, eq=False)
 class FmuSpec:
-    """A machine on its way into an archive."""
+    """An FMU of a machine, to be built."""
 
     machine: Machine
     table: FmuTable  # model, model identifier, start values and variables

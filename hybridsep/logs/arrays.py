@@ -48,7 +48,7 @@ def _by_columns(arrays: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-class _GivenSource(ArraysSource):
+class GivenSource(ArraysSource):
     """Columns in memory; of times the seconds since the first one."""
 
     def __init__(self, path: Path, arrays: Mapping[str, Any]) -> None:
@@ -69,6 +69,7 @@ class _GivenSource(ArraysSource):
         self.stamps = frozenset(name for name, one in self._given.items() if one.values.dtype.kind in "mM")
 
     def column(self, name: str) -> Array:
+        """Return a column's values."""
         if name in self._refused:
             raise self._refused[name]
         values = self._given[name].values
@@ -84,16 +85,16 @@ class _GivenSource(ArraysSource):
         return values.astype(np.float64).ravel()
 
 
-class TableSource(_GivenSource):
+class TableSource(GivenSource):
     """A mapping of arrays, a structured array, or a table of pandas, polars, Arrow or xarray.
 
     An index of times is the time, unless a column is called so; one of numbers tells where rows are missing.
     """
 
-    def __init__(self, table: Any) -> None:
+    def __init__(self, table: Any, path: Path = Path("arrays")) -> None:
         if callable(getattr(type(table), "collect", None)):  # polars' LazyFrame
             table = table.collect()
-        super().__init__(Path("arrays"), _columns_of(table))
+        super().__init__(path, _columns_of(table))
         if hasattr(type(table), "column_names"):  # Arrow
             self.units = {**self.units, **_field_units(table.schema)}
             self.twins = with_own_names(table.column_names)[1]
@@ -143,7 +144,7 @@ def _field_units(schema: Any) -> dict[str, str]:
     return {name: unit.decode(errors="replace") for name, unit in stated.items() if unit}
 
 
-class NpzSource(_GivenSource):
+class NpzSource(GivenSource):
     """The arrays of an ``.npz`` file, compressed or not; a column of a matrix is ``name[0]``."""
 
     format = "NumPy .npz"
@@ -168,7 +169,7 @@ class NpzSource(_GivenSource):
         return head.startswith(b"PK\x03\x04") and name.endswith(b".npy")
 
 
-class MatSource(_GivenSource):
+class MatSource(GivenSource):
     """The vectors of a ``.mat`` file of version 4, 5, 6 or 7; in structs they are called ``struct.field``.
 
     A complex vector ``H`` is there as ``H.real`` and ``H.imag`` too, a column of a matrix as ``name[0]``.
@@ -209,7 +210,7 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
             yield f"{name}.imag", value.imag
 
 
-class ParquetSource(ArraysSource):
+class ParquetSource(TableSource):
     """The columns of a Parquet file; fields of structs are ``struct.field``.
 
     Nothing in the place of a number is NaN. Timestamps, times of day and durations become seconds since the first one.
@@ -220,37 +221,18 @@ class ParquetSource(ArraysSource):
     marks = (b"PAR1",)
 
     def __init__(self, path: Path) -> None:
-        super().__init__(path)
         try:
-            self._arrow, self._parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+            arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
         except ModuleNotFoundError as error:
             raise LogError(f"{path}: is a Parquet file, which needs: pip install 'hybridsep[parquet]'") from error
-        with _reading(path, "a Parquet file"), self._parquet.ParquetFile(path) as file:
-            schema = self._flat(file.schema_arrow.empty_table()).schema
-        types = self._arrow.types
-        temporal = (types.is_timestamp, types.is_time, types.is_duration)
-        self.names = list(schema.names)
-        self.stamps = frozenset(field.name for field in schema if any(is_one(field.type) for is_one in temporal))
-        self.units = _field_units(schema)
-
-    def column(self, name: str) -> Array:
-        """Return a column."""
-        with _reading(self.path, "a Parquet file"), self._parquet.ParquetFile(self.path) as file:
-            values = self._flat(file.read(columns=[name])).column(name)
-            kind, types = values.type, self._arrow.types
-            if name in self.stamps:
-                whole = self._arrow.int32() if kind.bit_width == 32 else self._arrow.int64()
-                counts = values.cast(whole).to_numpy()
-                since = np.asarray((counts - counts[:1]) * TIME_UNITS[kind.unit].factor, dtype=np.float64)
-                return past_midnights(since, 86_400.0) if types.is_time(kind) else since
-            if types.is_decimal(kind):
-                values = values.cast(self._arrow.float64())
-            elif not (types.is_integer(kind) or types.is_floating(kind)):
-                raise LogError(f"{self.path}: column {brief(name)} must be numbers, got {kind}")
-            return np.asarray(values.to_numpy(), dtype=np.float64)
-
-    def _flat(self, table: Any) -> Any:
-        """Return a table with the fields of its structs as columns."""
-        while any(map(self._arrow.types.is_struct, table.schema.types)):
-            table = table.flatten()
-        return table
+        with _reading(path, "a Parquet file"):
+            table = parquet.read_table(path)
+            while any(map(arrow.types.is_struct, table.schema.types)):
+                table = table.flatten()
+        times = {field.name: field.type for field in table.schema if arrow.types.is_time(field.type)}
+        for name, kind in times.items():
+            counts = table.column(name).cast(arrow.int32() if kind.bit_width == 32 else arrow.int64())
+            seconds = past_midnights(counts.to_numpy() * TIME_UNITS[kind.unit].factor, 86_400.0)
+            table = table.set_column(table.column_names.index(name), name, arrow.array(seconds - seconds[:1]))
+        super().__init__(table, path)
+        self.units = {**self.units, **dict.fromkeys(times, "s")}

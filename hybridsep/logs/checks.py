@@ -22,7 +22,7 @@ from ..base.signals import Array, Indices
 from ..base.threads import one_blas_thread
 from .columns import error_option
 from .log import Log, uneven
-from .units import POSITION_UNITS, UNIT_OPTIONS
+from .units import POSITION_UNITS
 
 _SAMPLES_MIN = 100  # samples below which nothing can be learned and judged: a window of the default length
 
@@ -116,7 +116,7 @@ def check(log: Log) -> tuple[Finding, ...]:
     if any(one.refused for one in found):
         return found
     notes = (*found, *_note_missing(log), *_note_rate(log), *_note_outliers(log), *_note_start(log))
-    notes += (*_note_moved_at_rest(log), *_note_held(log, given.lag_of_one if given else 0))
+    notes += (*_note_anew(log), *_note_moved_at_rest(log), *_note_held(log, given.lag_of_one if given else 0))
     return (*notes, *(_note_relation(log, x_d, x, given) if given else ()))
 
 
@@ -181,7 +181,8 @@ def _unit(log: Log) -> Iterator[Finding]:
         "a feed axis has: are the positions in a smaller unit or, of a rotary axis, in deg?"
     )
     evidence, stated = {"travel": travel, "acceleration": usual}, log.unit_stated
-    yield Finding("unit", words, evidence, refused=not stated, options=() if stated else UNIT_OPTIONS)
+    options = (("--unit mm", "a linear axis in mm"), ("--unit um", "in µm"), ("--unit deg", "a joint in degrees"))
+    yield Finding("unit", words, evidence, refused=not stated, options=() if stated else options)
 
 
 class _Following(NamedTuple):
@@ -349,6 +350,22 @@ def _note_missing(log: Log) -> Iterator[Finding]:
         yield Finding("missing samples", words, {"n": float(len(missing))})
 
 
+def _note_anew(log: Log) -> Iterator[Finding]:
+    """Note a measured position that jumps by all of its range from one sample to the next, and goes on from there."""
+    steps = np.nan_to_num(np.concatenate([np.diff(one.x_meas) for one in log.segments()]))
+    most = (1.0 - _IN_A_SAMPLE) * _travel(log.x_meas)
+    jumps = np.abs(steps) > most
+    n, turn, others = int(jumps.sum()), float(np.abs(steps).max()), np.abs(np.where(jumps, 0.0, steps))
+    way = float(np.ptp(np.cumsum(np.where(jumps, steps - np.copysign(turn, steps), steps))))
+    if n > 1 and others.max() < _IN_A_SAMPLE * most and way > turn / 2.0:
+        words = (
+            f"the measured position jumps {n} times by all of its range, {log.shown.words(turn, '.4g')}, between two "
+            "samples, and goes on from there: does it begin anew, as a modulo axis or a counter? Unwrap both positions "
+            "before; such jumps are identified and judged as motion"
+        )
+        yield Finding("begins anew", words, {"n": float(n), "range": turn})
+
+
 def moved_by_command(log: Log) -> Array:
     """Return a segment's measured positions, ``(n,)``, NaN where something else moves the axis at a command's rest."""
     at, error, x = np.arange(len(log.t)), log.x_meas - log.x_d, np.array(log.x_meas)
@@ -401,7 +418,7 @@ def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterato
     if late * log.T_s > 0.1 and found.lag < 1.5 * late:  # noise spreads a mixture over lags
         words = (
             f"the measured position lags its command by {least}{late} samples ({late * log.T_s:.3g} s), drive, dead "
-            "time and recorder together"
+            f"time and recorder together{': were ms given as s?' if late * log.T_s > 1.0 else ''}"
         )
         options = (("--delay N", "where the recorder is known to be N samples late"),)
         yield Finding("late", words, {"lag": late * log.T_s}, options=options)

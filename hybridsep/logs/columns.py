@@ -10,17 +10,11 @@ import numpy as np
 
 from ..base.errors import LogError, brief, listed
 from ..base.signals import Array
-from .names import ROLES, axes_of, has_word, known_names, lone_position, signals_of
+from .names import ROLES, axes_of, beside_error, has_word, known_names, signals_of
 from .source import Block, Source
 from .text import is_number, stamp_kind
 from .times import COUNTED
-from .units import POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
-
-_COUNTS = (
-    "count", "counts", "cts", "cnt", "qc", "inc", "incr", "inkr", "increment", "increments", "pulse", "pulses", "tick",
-    "ticks", "lu", "puu", "step", "steps",
-)  # fmt: skip
-"""Spellings of an encoder's count where a unit is stated, in small letters; its length must be given."""
+from .units import COUNTS, POSITION_UNITS, TIME_UNITS, Unit, plain_name, position_unit, stated_unit, time_unit
 
 _OTHERS = re.compile(r"/|rpm|min-1|hz|%", re.IGNORECASE)  # in units of what is no position; another one may be given
 
@@ -54,7 +48,8 @@ def choose_columns(
             raise LogError(f"{source.path}: columns may name {', '.join(ROLES)}, error, got {brief(role)}")
     given = dict(columns or {})
     error = given.pop("error", None)
-    chosen, remarks = _positions(source, given, axis)
+    beside = beside_error(source.names, error) if error and axis is None and not {"x_d", "x"} & given.keys() else {}
+    chosen, remarks = ({"x_d": None, "x": None, **beside}, []) if beside else _positions(source, given, axis)
     time = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
     if time is None and "t" not in given:
         time = _only_time(source)
@@ -64,7 +59,7 @@ def choose_columns(
             remarks = [*remarks, f"column {brief(time)} is read as the time; columns (--t) names another"]
         elif not time_needed:
             time = _row_labels(source)
-    if time and "t" not in given and not time_needed and plain_name(_stated(source, time)) in _COUNTS:
+    if time and "t" not in given and not time_needed and plain_name(_stated(source, time)).rstrip("s") in COUNTS:
         time = None  # it counts samples, and the interval is given
     told, sign = _told_by_error(source, chosen, given, error) if error is not None else ("", 0)
     if time is not None or "t" in given or time_needed:
@@ -75,14 +70,14 @@ def choose_columns(
     found: dict[str, Column] = {}
     names = {role: name for role, name in chosen.items() if name is not None}
     if len(names) < len(chosen):
-        raise _missing(source, {role: given.get(role, role) for role in chosen if role not in names})
+        raise _missing(source, {"error" if r == told else r: given.get(r, r) for r in chosen if r not in names})
     for role, name in names.items():
         if source.names.count(name) > 1:
             raise LogError(f"{source.path}: column {brief(name)} must occur once, got {source.names.count(name)}")
         found[role] = _time(source, name) if role == "t" else _position(source, name, unit, sign * (role == told))
     if told and not found[told].stated:  # an error is in the unit of the position beside it
-        beside = found["x" if told == "x_d" else "x_d"]
-        found[told] = replace(found[told], unit=beside.unit, stated=beside.stated)
+        other = found["x" if told == "x_d" else "x_d"]
+        found[told] = replace(found[told], unit=other.unit, stated=other.stated)
     x_d, x = found["x_d"], found["x"]
     if x_d.unit.si != x.unit.si:
         units = f"{brief(x_d.name)} is in {x_d.unit.name} and column {brief(x.name)} in {x.unit.name}"
@@ -95,7 +90,7 @@ def _told_by_error(source: Source, chosen: dict[str, str | None], given: dict[st
     if {"x_d", "x"} <= given.keys():
         raise LogError(f"{source.path}: columns may name two of x_d, x and error, got all three")
     if not any(chosen.values()):
-        chosen |= lone_position(source.names)
+        chosen |= beside_error(source.names)
     told = "x" if chosen["x_d"] and "x" not in given else "x_d"
     name = _name(source, "error", error)
     sign, name = (1, name) if name else (-1, _name(source, "error", error.removeprefix("-")))
@@ -181,8 +176,8 @@ def _name(source: Source, role: str, given: str | None) -> str | None:
     if role in source.roles:
         return source.roles[role]
     known = known_names(role, source.names)
-    if not known and not (source.axes or axes_of(source.names)):  # in structs, log.x_d, or timeseries, log.x_d.Data
-        ends = {name: _DATA.sub("", name).rpartition(".")[2] for name in source.names}
+    if not known and not (source.axes or axes_of(source.names)):  # in structs and models, timeseries too, log.x_d.Data
+        ends = {name: re.split("[./]", _DATA.sub("", stated_unit(name)[0]))[-1] for name in source.names}
         known = [name for best in [known_names(role, [*ends.values()])] for name in source.names if ends[name] in best]
     if len(set(known)) > 1:
         raise LogError(f"{source.path}: column {role} may be {listed(known)}; name it: --{role} NAME")
@@ -229,15 +224,14 @@ def _missing(source: Source, names: Mapping[str, str]) -> LogError:
         return LogError(f"{source.path}: {it}; call the commanded position so in the file")
     what = ", ".join(repr(name) if name == role else f"{brief(name)} ({role})" for role, name in names.items())
     which, it = (f"column {what} is", "it") if len(names) == 1 else (f"columns {what} are", "them")
-    options = " ".join(f"--{role} NAME" for role in names)
-    options += " (or --T_s SECONDS instead of --t)" if "t" in names else ""
-    of_python = f"; in Python by columns={{{', '.join(f'{role!r}: NAME' for role in names)}}}"
-    of_python += ", or T_s=SECONDS" if "t" in names else ""
+    of_times = (" (or --T_s SECONDS instead of --t)", ", or T_s=SECONDS") if "t" in names else ("", "")
+    options = " ".join(f"--{role} NAME" for role in names) + of_times[0]
+    of_python = f"; in Python by columns={{{', '.join(f'{role!r}: NAME' for role in names)}}}{of_times[1]}"
     there = f"{which} missing, the file has {listed(source.names)}"
     errors, speeds = ([name for name in source.names if has_word(kind, name)] for kind in ("error", "velocity"))
     instead = "; velocities are none: record positions" if speeds and not errors and set(names) != {"t"} else ""
-    if errors and set(names) != {"t"}:
-        if {"x_d", "x"} <= names.keys() and not lone_position(source.names):
+    if errors and {"x_d", "x"} & names.keys():
+        if {"x_d", "x"} <= names.keys() and not beside_error(source.names):
             instead = "; an error alone tells neither position: record one beside it"
         else:
             instead = f"; or the error beside one position, commanded − measured: {error_option(errors[0])} (where it "
@@ -270,7 +264,7 @@ def _position(source: Source, name: str, given: str | None, error: int) -> Colum
     text = _stated(source, name)
     unit = position_unit(text) if text else None
     given = None if error and unit is not None else given  # an error may have a unit of its own
-    counts = plain_name(text) in _COUNTS or (given is not None and unit is None and not _OTHERS.search(text))
+    counts = plain_name(text).rstrip("s") in COUNTS or (given is not None and unit is None and not _OTHERS.search(text))
     if counts and given is None:
         raise LogError(f"{it} is in encoder counts; give the length of one, such as unit='0.1um' (--unit 0.1um)")
     if text and unit is None and not counts:

@@ -36,6 +36,7 @@ _HDF5 = """these three lines convert it:
 import h5py, numpy
 with h5py.File('{path}') as f:
     numpy.savez('log.npz', t=f['t'][()].ravel(), x_d=f['x_d'][()].ravel(), x=f['x'][()].ravel())"""
+_JSON = _PANDAS.format("json") + " (lines=True where each line is a row)"
 _PAGE = "docs/howto/recorders.md has three lines of Python that convert it"
 
 _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
@@ -46,16 +47,8 @@ _OTHERS: tuple[tuple[str, tuple[bytes, ...], str], ...] = (
     ("a NumPy .npy array", (b"\x93NUMPY",), "numpy.savez('log.npz', t=a[:, 0], x_d=a[:, 1], x=a[:, 2])"),
     ("a ROS bag", (b"#ROSBAG", b"\x89MCAP0"), "export the joint's topic as CSV, for example by PlotJuggler"),
     ("an old Excel workbook", (b"\xd0\xcf\x11\xe0",), f"{_SAVE} there"),
-    (
-        "XML of another kind than a SINUMERIK trace",
-        (b"<?xml", b"\xef\xbb\xbf<?xml"),
-        f"{_SAVE}; a TIA scope exports it itself",
-    ),
-    (
-        "JSON of another kind than Siemens Capture",
-        (b'{"', b"{ ", b"{\n", b"{\r", b"[{", b"[[", b"[\n"),
-        _PANDAS.format("json") + " (lines=True where each line is a row)",
-    ),
+    ("XML, but no SINUMERIK trace", (b"<?xml", b"\xef\xbb\xbf<?xml"), f"{_SAVE}; a TIA scope exports it itself"),
+    ("JSON, but no Siemens Capture", (b'{"', b"{ ", b"{\n", b"{\r", b"[{", b"[[", b"[\n"), _JSON),
     ("compressed", (b"BZh", b"\xfd7zXZ", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf"), "unpack it, or compress it by gzip"),
     ("an Excel workbook, or another zip archive", (b"PK\x03\x04",), f"{_SAVE} in Excel, or unpack it"),
 )

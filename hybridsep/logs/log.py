@@ -11,10 +11,10 @@ from functools import partial
 from itertools import pairwise
 from numbers import Integral
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import LogError, ParameterError, brief, check_kind
 from ..base.settings import check
@@ -27,7 +27,18 @@ from .source import Block, Source
 from .times import NOT_LATER, Times, recorded_times
 from .units import POSITION_UNITS, DisplayUnits, position_unit, shown_of, stated_unit
 
-Table = Any  # of pandas, polars, Arrow or xarray, or a structured array
+
+class _Frame(Protocol):
+    @property
+    def columns(self) -> Any: ...
+
+
+class _Dataset(Protocol):
+    @property
+    def data_vars(self) -> Any: ...
+
+
+Table = _Frame | _Dataset | NDArray[np.void]  # of pandas, polars or Arrow; xarray; a structured array
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,7 +319,7 @@ def whole_turns(given: Log) -> tuple[Log, str]:
     x_meas[known] = np.unwrap(x_meas[known], period=_TURN)
     x_meas -= _TURN * np.round(np.median(x_meas[known] - x_d[known]) / _TURN)
     # A command may well jump by one turn: the axis then follows it through, and loses it if the jump is taken out.
-    if _error(x_d, x_meas) > _error(given.x_d, given.x_meas):
+    if _error(x_d, x_meas) > 1.001 * _error(given.x_d, given.x_meas):  # one may be made of the other and their error
         return given, ""
     first = min(int(where[0]) for where in jumps if len(where))
     said = f"{n} jumps of a whole turn, the first at sample {first + 1}: both positions are unwrapped"

@@ -34,11 +34,12 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 
 _SOLL, _IST = {"sollposition", "solllage", "lagesollwert"}, {"istposition", "istlage", "lageistwert"}
 _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoint", "sp", "des", "desired", "target"}
-_COMMANDED |= {"goal", "commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"} | _SOLL
+_COMMANDED |= {"goal", "action", "commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"}
+_COMMANDED |= _SOLL
 _MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "pv", "ist"} | _IST
-_MEASURED |= {"mesure", "istwert", "present"}
+_MEASURED |= {"mesure", "istwert", "present", "observation"}
 _ESTIMATED = {"estimate", "estimated"}  # measured where nothing else is
-_POSITION = {"pos", "position", "positions", "lage", "angle", "pl", "pctrl", "pulses"} | _SOLL | _IST
+_POSITION = {"pos", "position", "positions", "lage", "weg", "angle", "pl", "pctrl", "pulses"} | _SOLL | _IST
 _FILLING = {"axis", "value", "values", "data", "state", "states", "current"}
 _SENT = {"control", "input"}  # commanded beside a word for the position, else a controller's output
 _VELOCITY = {"vel", "velo", "velocity", "velocities", "speed", "speeds", "geschwindigkeit"}
@@ -128,11 +129,18 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     return found
 
 
-def lone_position(names: Sequence[str]) -> dict[str, str]:
-    """Return the only commanded position by its role, or the only measured one; empty where there are none."""
+def beside_error(names: Sequence[str], error: str = "") -> dict[str, str]:
+    """Return the positions by role of the axis whose words an error's name has, without a name of the only one."""
     commanded, measured, _ = _by_words(names)
-    only = list((commanded or measured).values())
-    return {"x_d" if commanded else "x": only[0]} if len(only) == 1 else {}
+    words, both = _words(error), {axis: {"x_d": x_d, "x": x} for axis, (x_d, x) in axes_of(names).items()}
+    alone = {axis: {"x": x} for axis, x in measured.items() if words or not commanded}
+    for known in (both, alone | {axis: {"x_d": x_d} for axis, x_d in commanded.items()}):
+        own = {axis: _words(axis) for axis in known}
+        n = {axis: len(own[axis] & words) for axis in own if not words or (own[axis] and own[axis] <= words)}
+        best = [axis for axis in n if n[axis] == max(n.values())]
+        if len(best) == 1:
+            return known[best[0]]
+    return {}
 
 
 def signals_of(names: Sequence[str], measured: str) -> dict[str, str]:
@@ -159,9 +167,13 @@ def _tokens(name: str) -> list[str]:
     return _TOKEN.findall(_POS.sub(r" \1", _COLUMN.sub(r" \1", plain).replace("_", " ")))
 
 
+def _words(name: str) -> set[str]:
+    return {token.lower() for token in _tokens(name) if token.isalnum()}
+
+
 def has_word(kind: str, name: str) -> bool:
     """Return whether a name has a word of a time, a velocity or an error."""
-    return not {"t": _TIME, "velocity": _VELOCITY, "error": _ERROR}[kind].isdisjoint(map(str.lower, _tokens(name)))
+    return not {"t": _TIME, "velocity": _VELOCITY, "error": _ERROR}[kind].isdisjoint(_words(name))
 
 
 def _spelling(name: str) -> str:

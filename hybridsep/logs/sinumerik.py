@@ -12,14 +12,14 @@ import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
 from ..base.errors import LogError, brief, first_line
-from ..base.signals import Array
+from .arrays import GivenSource
 from .names import SIGNALS, axes_of
-from .source import ArraysSource
 
 _ADDRESS = re.compile(r"(?:.*/)?(?P<name>[^/\[\]]+?)\s*(?:\[\s*(?:[a-z]\d*\s*,\s*)?(?P<axis>\w+)\s*\])?\s*")
 """``/Nck/!SD/nckServoDataCmdPos2ndEnc64 [u1, 7]``: a variable of axis 7."""
@@ -77,7 +77,7 @@ def _signals_of(path: Path) -> tuple[list[_Signal], float]:
     return list(signals.values()), last
 
 
-class SinumerikSource(ArraysSource):
+class SinumerikSource(GivenSource):
     """The signals of a trace, by the last part of their address and the axis: ``nckServoDataCmdPos2ndEnc64|7``.
 
     Without a choice, the first axis with a commanded and a measured position is read. Positions are in millimetres
@@ -88,8 +88,7 @@ class SinumerikSource(ArraysSource):
     endings = (".xml",)
 
     def __init__(self, path: Path) -> None:
-        super().__init__(path)
-        signals, self._last = _signals_of(path)
+        signals, last = _signals_of(path)
         self._signals: dict[str, _Signal] = {}
         for signal in signals:
             name = f"{signal.name}|{signal.axis}" if signal.axis else signal.name
@@ -97,14 +96,22 @@ class SinumerikSource(ArraysSource):
                 name += "'"
             self._signals[name] = signal
         clocks: dict[tuple[float, float], str] = {}  # of columns of times by first time and interval
-        self.times = {
+        times = {
             name: clocks.setdefault((signal.t[0], signal.interval), "time" if not clocks else f"time#{len(clocks) + 1}")
             for name, signal in self._signals.items()
             if signal.t
         }
-        self._clocks = {name: clock for clock, name in clocks.items()}
-        self.names = [*self._signals, *self._clocks]
-        self.units = dict.fromkeys(self._clocks, "s")
+        columns: dict[str, Any] = {one: LogError(f"{path}: column {brief(one)} has no values") for one in self._signals}
+        for (start, interval), clock in clocks.items():  # each value is held until the next one
+            own = {name: signal for name, signal in self._signals.items() if times.get(name) == clock}
+            n = min(*(signal.n for signal in own.values()), math.floor((last - start) / interval + 1.5))
+            k = np.arange(n, dtype=np.float64)
+            columns[clock] = start + interval * k
+            for name, signal in own.items():
+                written = np.rint((np.array(signal.t) - start) / interval)
+                columns[name] = np.array(signal.values)[np.searchsorted(written, k, side="right") - 1]
+        super().__init__(path, columns)
+        self.times, self.units = times, dict.fromkeys(clocks.values(), "s")
         self.assumed_units = {name: "mm" for name, signal in self._signals.items() if signal.kind == "posn"}
         self.axes = self._positions()
 
@@ -112,21 +119,6 @@ class SinumerikSource(ArraysSource):
     def recognises(head: bytes) -> bool:
         """Return whether it is XML with a trace session near its beginning."""
         return head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<") and b"<traceSession" in head
-
-    def column(self, name: str) -> Array:
-        """Return the times of a clock, or a signal's values, each held until the next one."""
-        clock = self.times.get(name, name)
-        if clock not in self._clocks:
-            raise LogError(f"{self.path}: column {brief(name)} has no values")
-        start, interval = self._clocks[clock]
-        most = min(self._signals[one].n for one, own in self.times.items() if own == clock)
-        n = min(most, math.floor((self._last - start) / interval + 1.5))
-        k = np.arange(n, dtype=np.float64)
-        if name == clock:
-            return start + interval * k
-        signal = self._signals[name]
-        written = np.rint((np.array(signal.t) - start) / interval)
-        return np.array(signal.values)[np.searchsorted(written, k, side="right") - 1]
 
     def _positions(self) -> dict[str, tuple[str, str]]:
         found: dict[str, tuple[str, str]] = {}
@@ -142,7 +134,7 @@ _COUNTER = "CYCLE"
 _TIME = "t"  # name of the time column, which is made from the counter of cycles
 
 
-class CaptureSource(ArraysSource):
+class CaptureSource(GivenSource):
     """Recording of a Siemens controller in Capture's JSON, read whole.
 
     The columns are the high-frequency signals under their own names, such as ``DES_POS|1``, and ``t`` from ``CYCLE``.
@@ -153,7 +145,6 @@ class CaptureSource(ArraysSource):
     endings = (".json",)
 
     def __init__(self, path: Path) -> None:
-        super().__init__(path)
         try:
             content = json.loads(path.read_bytes())
         except (ValueError, RecursionError) as error:
@@ -170,26 +161,21 @@ class CaptureSource(ArraysSource):
                 f"{path}: must have Header.CycleTimeMs, the Name and Axis of each of Header.SignalListHFData, and rows "
                 f"of as many numbers in each HFData of Payload: {type(error).__name__}: {first_line(error)}"
             ) from error
-        self._columns = {name: values[:, i] for i, name in enumerate(names)}
-        self.names = list(names)
-        if _COUNTER in self._columns:
-            self._columns[_TIME] = 1e-3 * cycle * (self._columns[_COUNTER] - self._columns[_COUNTER][:1])
-            self.names.append(_TIME)
+        columns = {name: values[:, i] for i, name in enumerate(names)}
+        if _COUNTER in columns:
+            columns[_TIME] = 1e-3 * cycle * (columns[_COUNTER] - columns[_COUNTER][:1])
+        super().__init__(path, columns)
         self.axes = {axes[x_d]: (x_d, x) for x_d, x in axes_of(names).values()}
-        moving = [axis for axis, (x_d, _) in self.axes.items() if np.ptp(self._columns[x_d]) != 0.0]
+        moving = [axis for axis, (x_d, _) in self.axes.items() if np.ptp(columns[x_d]) != 0.0]
         self.axis = moving[0] if moving else ""
         self.assumed_units = {
             name: "deg" if axis.upper().startswith(("A", "B", "C", "S")) else "mm"  # of rotary axes and spindles
             for name, axis in axes.items()
             if name.split("|")[0] in ("ENC_POS", *SIGNALS.values())
         }
-        self.roles = {"t": _TIME} if _TIME in self._columns else {}
+        self.roles = {"t": _TIME} if _TIME in columns else {}
 
     @staticmethod
     def recognises(head: bytes) -> bool:
         """Return whether it is a JSON object with the list of signals near its beginning."""
         return head.lstrip().startswith(b"{") and b'"SignalListHFData"' in head
-
-    def column(self, name: str) -> Array:
-        """Return a signal."""
-        return self._columns[name]

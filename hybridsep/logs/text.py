@@ -2,7 +2,7 @@
 
 The first lines tell the table: what delimits its fields, where its numbers begin, and which line above them has the
 names. Below, a line without any number (an ``overrun``, names that are written again) is left out and counted; what is
-left must have the table's columns. Of clock timestamps the time of day counts; dates and zones are passed over.
+left must have the table's columns. Of clock timestamps the time of day counts; dates and zones are ignored.
 """
 
 import codecs
@@ -33,7 +33,10 @@ _BLOCK = 10_000  # lines that are converted at once
 _COMMENTS = ("#", "%", "//", "!")  # beginnings of a comment line
 
 _DELIMITERS = (";", "\t", ",", "|", None)  # delimiters by precedence; None is blanks
-_UNIT_ROWS = ("unit", "units", "einheit", "einheiten", "y_unit_label")  # first cells of rows of units
+_UNIT_ROW = re.compile("unit|einheit", re.IGNORECASE)  # in the first cell of a row of units
+_HEAD = 4  # rows above the numbers of which one has the names: units and descriptions may be below it
+_FACTOR = re.compile(r"[x*×/]\s*[.,\d]")  # begins a cell of a row of factors, which no reader may pass over
+_WITH_UNIT = re.compile(r"^([+-]?[\d.,]+(?:e[+-]?\d+)?)\s+([a-zµ]+)$", re.IGNORECASE)  # 0.001 sec, as of MATLAB
 _NO_UNITS = ("", "-", "1", "[-]")  # entries of a row of units where a column has none
 _BLANK = -math.inf  # stands for a blank cell of the command until it is filled
 _APART = 0.9  # share of rows with one of the two positions from which on channels have times of their own
@@ -87,6 +90,7 @@ class _Table:
     header: int  # line number of the names, from 1
     first: int  # line number from which numbers are read
     clocks: set[int]  # indices of columns of timestamps with a time of day
+    in_cells: dict[int, str]  # index of a column → unit behind each of its numbers
 
 
 class TextSource(Source):
@@ -206,7 +210,7 @@ class TextSource(Source):
         if text[0].isdigit() or text.isspace() or text.lstrip().startswith(_COMMENTS):
             return not text[0].isdigit()
         fields = split(text.strip(" \r\n"), self._table.delimiter)
-        if any(is_number(decimal_points(field)) or stamp_kind(field) for field in fields):
+        if any(is_number(field.replace(",", ".")) or stamp_kind(field) for field in fields):
             return False
         self._left_out.append((number, text))
         return True
@@ -244,7 +248,7 @@ class TextSource(Source):
         for i in use:
             if i >= len(fields):
                 continue
-            name, field = self.names[i], fields[i]
+            name, field = self.names[i], fields[i].removesuffix(self._table.in_cells.get(i, "")).rstrip()
             may_miss = name in (self.measured, *self.twins.get(self.measured, ()))
             try:
                 if i in self._table.clocks:
@@ -267,9 +271,10 @@ class TextSource(Source):
     def _number(self, field: str) -> float:
         """Return a number; ValueError if it is none, or a comma in it has no meaning in this file."""
         comma = self._comma
-        if ("." in field) if comma == "." else ("," in field and (comma is None or not _THOUSANDS.fullmatch(field))):
+        wrong = "." in field if comma == "." else "," in field and (comma is None or not _THOUSANDS.fullmatch(field))
+        if wrong or "_" in field:
             raise ValueError(field)
-        return _number(field.replace(",", comma or ""))
+        return float(field.replace(",", comma or ""))
 
 
 def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]]]:
@@ -284,20 +289,13 @@ def with_own_names(names: Sequence[str]) -> tuple[list[str], dict[str, list[str]
     return own, twins
 
 
-def _number(text: str) -> float:
-    """Return a number with a decimal point; ValueError if it is none, or an underscore is one of its digits."""
-    if "_" in text:
-        raise ValueError(text)
-    return float(text)
-
-
 def is_number(text: str) -> bool:
-    """Return whether a field is a number with a decimal point."""
+    """Return whether a field is a number with a decimal point; an underscore is no digit of one."""
     try:
-        _number(text)
+        float(text)
     except ValueError:
         return False
-    return True
+    return "_" not in text
 
 
 def stamp_kind(text: str) -> str:
@@ -316,11 +314,6 @@ def _nanoseconds(text: str) -> float:
     _, hour, minute, second, fraction, half = match.groups()
     hours = int(hour) if half is None else int(hour) % 12 + 12 * (half in "Pp")
     return float((3600 * hours + 60 * int(minute) + int(second)) * _SECOND + int((fraction or "").ljust(9, "0")))
-
-
-def decimal_points(text: str) -> str:
-    """Return a text with decimal points for commas."""
-    return text.replace(",", ".")
 
 
 def split(line: str, delimiter: str | None) -> list[str]:
@@ -385,23 +378,24 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
         return None
     number, line = known[0]
     mark = next((mark for mark in _DELIMITERS if mark and mark in line), None)
-    return _Table(_names(line, mark), {}, mark, None, False, number, number + 1, set())
+    return _Table(_names(line, mark), {}, mark, None, False, number, number + 1, set(), {})
 
 
 def _width(fields: Sequence[str]) -> int:
     """Return the number of fields of a row of numbers, 0 if more than half of them are neither that nor missing."""
-    numbers = sum(map(_is_written, fields))
-    others = [text for text in fields if text and not _is_written(text) and not _MISSING.fullmatch(text)]
-    return len(fields) if numbers and numbers >= sum(not stamp_kind(text) for text in others) else 0
+    others = [text for text in fields if not (_is_written(text) or _WITH_UNIT.match(text))]
+    texts = [text for text in others if text and not _MISSING.fullmatch(text) and not stamp_kind(text)]
+    return len(fields) if len(fields) > len(others) and len(fields) - len(others) >= len(texts) else 0
 
 
 def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int, mark: str | None) -> _Table | None:
-    """Return the table of a run of rows below its names, and perhaps a row of units; None without them."""
+    """Return the table of a run of rows below its names, perhaps of units too, hh:mm:ss of timestamps; None without."""
     fields = [row for _, row, _ in rows[start:end]]
     width = len(fields[0])
     blank = next(i for i in range(width) if any(row[width - 1 - i] for row in fields))  # at the ends of rows
     kinds = [_kind([row[i] for row in fields]) for i in range(width)]
     above: list[tuple[int, list[str]]] = []
+    apart = False  # whether other comments stand between
     for number, _, line in reversed(rows[:start]):
         names = _names(line, mark)
         if mark is None and len(names) == width - 1 and ("date", "time") in pairwise(kinds):
@@ -412,27 +406,34 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
         if len(names) == width - blank - 1 and (blank == 0) and _are_row_names([row[0] for row in fields]):
             names = ["", *names]
         fits = width - blank <= len(names) <= width
+        is_comment = line.lstrip().startswith(_COMMENTS)
         if fits and not all(map(is_number, names)) and not any(map(stamp_kind, names)):
-            above.append((number, names))
-        elif not line.lstrip().startswith(_COMMENTS):
+            above += [(number, names)] if n_known(names) or not (apart and is_comment) else []
+        elif not (apart := is_comment):
             break
     if not above:
         return None
-    keyed = next((row for _, row in above[:9] if row[0].casefold() in _UNIT_ROWS), None)  # a row that is called so
-    numeric = [i for i in range(len(above[0][1])) if not kinds[i]]  # hh:mm:ss may stand above timestamps
-    has_units = len(above) > 1 and _is_row_of_units([above[0][1][i] for i in numeric])
-    nearest = above[has_units:][:2]  # the one with more known names counts
-    header, names = max(nearest, key=lambda row: n_known(row[1]) if len(row[1]) == len(nearest[0][1]) else -1)
-    units = dict(zip(names, above[0][1] if has_units else ["", *(keyed or [""])[1:]], strict=False))
-    comma, settled = _comma_of([[row[i] for row in fields] for i in range(width)])
+    of_units = [_is_row_of_units([a for a, b in zip(row, kinds, strict=False) if not b]) for _, row in above]
+    factors = (i + 1 for i, (_, row) in enumerate(above) if any(map(_FACTOR.match, row)))  # nothing above is looked at
+    near = [i for i, is_units in enumerate(of_units[: min(_HEAD, next(factors, _HEAD))]) if not is_units] or [0]
+    at = max(near, key=lambda i: (n_known(above[i][1]), -i))  # the one with more known names counts, else the nearest
+    header, names = above[at]
+    below = (row for (_, row), is_units in zip(above[:at], of_units, strict=False) if is_units)
+    keyed = (row for _, row in above[:9] if row is not names and _UNIT_ROW.search(row[0]) and _is_row_of_units(row[1:]))
+    units = dict(zip(names, next(below, ["", *next(keyed, [""])[1:]]), strict=False))
+    behind = [{_WITH_UNIT.sub(r"\2", row[i]) for row in fields[:9] if row[i]} for i in range(len(names))]
+    in_cells = {i: next(iter(one)) for i, one in enumerate(behind) if len(one) == 1 and _is_row_of_units([*one])}
+    units |= {names[i]: unit for i, unit in in_cells.items()}
+    bare = [[row[i].removesuffix(in_cells.get(i, "")).rstrip() for row in fields] for i in range(width)]
+    comma, settled = _comma_of(bare)
     stated = {name: unit.strip("[]()") for name, unit in units.items() if unit not in _NO_UNITS}
     clocks = {i for i, kind in enumerate(kinds) if "time" in kind}
-    return _Table(names, stated, mark, comma, settled, header, rows[start][0], clocks)
+    return _Table(names, stated, mark, comma, settled, header, rows[start][0], clocks, in_cells)
 
 
 def _is_written(text: str) -> bool:
     """Return whether a field is a number, with a decimal comma or commas between thousands too."""
-    return is_number(decimal_points(text)) or bool(_THOUSANDS.fullmatch(text))
+    return is_number(text.replace(",", ".")) or bool(_THOUSANDS.fullmatch(text))
 
 
 def _comma_of(columns: Sequence[Sequence[str]]) -> tuple[str | None, bool]:

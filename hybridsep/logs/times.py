@@ -17,6 +17,7 @@ _CLOCKS = {"ms": 1e-3, "us": 1e-6, "100 ns": 1e-7, "ns": 1e-9, "min": 60.0, "d":
 """Units, s, that a column of times may be in which states none and is not in seconds."""
 
 _PLAUSIBLE = (2e-6, 0.5)  # intervals, s, of a log of an axis; beyond, a unit of times that is not stated is unknown
+_DRIFT = 0.01  # relative difference of intervals that are the same, more than a clock drifts
 COUNTED = 10  # fewest times whose unit is doubted: two or three seconds are no index yet
 
 NOT_LATER = 0.05  # share of times not above the one before from which they are too coarse to tell an interval or a gap
@@ -78,10 +79,10 @@ def recorded_times(path: Path, name: str, times: Array, factor: float, *, stated
         if not 1e-300 <= interval <= 1e300:
             raise LogError(f"{path}: time {brief(name)} must be in seconds, got an interval of {interval:g} s")
         T_s = _rounded(interval, _ROUNDING + min(_ROUNDING_MAX, _ERRORS * error))
-    elif counts or (not stated and _is_one_of(given / interval, *_CLOCKS.values())):
+    elif counts or (not stated and any(abs(given / interval / one - 1.0) <= _DRIFT for one in _CLOCKS.values())):
         t, T_s = (t - t[0]) * (given / interval), given  # precise, as it may be of 1970
         interval = given
-    elif _is_one_of(given / interval, 1.0):
+    elif abs(given / interval - 1.0) <= _DRIFT:
         T_s = given
     else:
         raise LogError(
@@ -153,10 +154,6 @@ def _unknown_unit(path: Path, name: str, first: float, interval: float, *, count
         f"{path}: column {brief(name)} {says}{guess}; give T_s ({hint or '--T_s'}){how}",
         [(hint, "the interval between the rows, s")] if hint else (),
     )
-
-
-def _is_one_of(ratio: float, *known: float) -> bool:
-    return any(abs(ratio / one - 1.0) <= 0.01 for one in known)  # more than a clock drifts
 
 
 def _words(

@@ -15,7 +15,7 @@ import numpy as np
 from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .source import ArraysSource
-from .text import decimal_points, is_number
+from .text import is_number
 
 _BOM = b"\xef\xbb\xbf"
 _NAME, _UNIT, _SAMPLE_TIME, _START = "Name", "Unit", "SampleTime[ms]", "Starttime of export"
@@ -45,16 +45,16 @@ class TwinCatSource(ArraysSource):
         block = next((i for i, (_, row) in enumerate(rows) if i and row[0] == _NAME), None)
         if block is None:
             raise LogError(f"{path}: a row of the channels' names was expected below the head, got none")
-        first = next((i for i in range(block, len(rows)) if is_number(decimal_points(rows[i][1][0]))), None)
+        first = next((i for i in range(block, len(rows)) if is_number(rows[i][1][0].replace(",", "."))), None)
         if first is None:
             raise LogError(f"{path}: numbers were expected below the channels' names, got none")
         self._first = rows[first][0]
         table = takewhile(lambda line: line and not line.startswith("EOF"), lines[first:])
-        self._lines = [line if self._mark == "," else decimal_points(line) for line in table]
+        self._lines = [line if self._mark == "," else line.replace(",", ".") for line in table]
         self._known = {row[0]: row for _, row in rows[block:first] if row[0]}
         self._places = self._channels(rows[first])
         # What times are counted in, and from when
-        time = decimal_points(rows[first][1][0])
+        time = rows[first][1][0].replace(",", ".")
         self._counted = float(time) > _FILETIME
         start = next((row[1] for _, row in rows[:block] if row[0] == _START and len(row) > 1 and row[1].isdigit()), "")
         whole = start if len(start) < 19 and start else time.partition(".")[0]
@@ -101,7 +101,7 @@ class TwinCatSource(ArraysSource):
         self._intervals = {
             name: 1e-3 * float(text)
             for name in self.times
-            if is_number(text := decimal_points(_cell(intervals, places[name][0])))
+            if is_number(text := _cell(intervals, places[name][0]).replace(",", "."))
         }
         fastest = min(self._intervals.values(), default=0.0)
         self._slow = {self.times[name] for name, interval in self._intervals.items() if interval > fastest}

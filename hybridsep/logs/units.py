@@ -27,9 +27,6 @@ POSITION_UNITS: Mapping[str, Unit] = {
 }
 """Units of positions by name; a log's positions are read in metres, or in radians where their unit is an angle."""
 
-UNIT_OPTIONS = (("--unit mm", "a linear axis in mm"), ("--unit um", "in µm"), ("--unit deg", "a joint in degrees"))
-"""Options that say the unit of a log that states none, each with what it means."""
-
 TIME_UNITS: Mapping[str, Unit] = _units("s", {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0})
 """Units of times by name."""
 
@@ -82,7 +79,14 @@ _SPELLINGS = {
     for name, spellings in {
         "m": "meter metre meters metres",
         "um": "micron microns",
-        "in": 'inch "',
+        "in": 'inch inches "',
+        "10 mm": "cm centimeter centimeters centimetre centimetres",
+        "12 in": "ft foot feet",
+        "0.001 in": "mil mils thou",
+        "0.001 nm": "pm",
+        "0.001 deg": "mdeg",
+        f"{1 / 60} deg": "arcmin",
+        f"{1 / 3600} deg": "arcsec",
         "deg": "° degree degrees",
         "rad": "radian radians",
         "rev": "turn turns revolution revolutions rot",
@@ -98,12 +102,19 @@ _SPELLINGS |= {
     for word, unit in _SPELLINGS.items()
     if unit in ("m", "s", "rad") and len(word) > 3
 }
-"""Other spellings, in small letters, of the units' names; µ is u."""
+"""Other spellings, in small letters, of the units' names, or of multiples; µ is u."""
 
-_SUFFIXES = {"mm", "um", "nm", "inch", "meter", "rad", "mrad", "urad", "deg", "s", "ms", "us", "ns", "counts", "ticks"}
+COUNTS = {"count", "ct", "cnt", "qc", "inc", "incr", "inkr", "increment", "pulse", "tick", "lu", "puu", "step"}
+"""Spellings of an encoder's count where a unit is stated, without a plural's s; its length must be given."""
+
+_SUFFIXES = {
+    "mm", "cm", "um", "nm", "inch", "inches", "meter", "rad", "mrad", "urad", "deg", "mdeg", "arcmin", "arcsec", "s",
+    "ms", "us", "ns", "counts", "ticks",
+}  # fmt: skip
 """Units that end a name after an underscore or a comma; m is none, as ``x_m`` is rather the measured position."""
 
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
+_INSIDE = re.compile(r"\s*[\[(](?P<unit>[^\[\]()]+)[\])]\s*")
 _SLASH = re.compile(r"^(?P<name>.*?\S)\s*(?:/|\bin\b)\s*(?P<unit>\S+)\s*$")
 _MULTIPLE = re.compile(r"^\s*(?P<times>\d*\.?\d+(?:[eE][+-]?\d+)?)\s*(?P<unit>\S+)\s*$")
 _SUFFIX = re.compile(r"^(?P<name>.*?[^_\s,])(?:_|\s*,\s*)(?P<unit>[^_\s,]+)$")
@@ -117,7 +128,7 @@ def plain_name(text: str) -> str:
 
 def position_unit(text: str, known_units: Mapping[str, Unit] = POSITION_UNITS) -> Unit | None:
     """Return the unit of a position of that spelling, or a multiple of one, ``0.1 um``; None if there is none."""
-    unit, multiple = known_units.get(plain_name(text)), _MULTIPLE.match(text)
+    unit, multiple = known_units.get(plain_name(text)), _MULTIPLE.match(plain_name(text))
     if unit is not None or multiple is None:
         return unit
     unit, times = known_units.get(plain_name(multiple["unit"])), float(multiple["times"])
@@ -147,7 +158,7 @@ def stated_unit(name: str) -> tuple[str, str]:
 
     ``x [mm]``, ``x (mm)``, ``x / mm``, ``x in mm``, ``x, mm`` and ``x_mm`` are ``("x", "mm")``. In square brackets any
     text is a unit, but for the number of a matrix's column, ``q[0]`` or ``q(0)``, and anywhere a known one divided by
-    another, as in ``v (mm/s)``; otherwise only a known one.
+    another, as in ``v (mm/s)``; otherwise only a known one, within the name too, ``x (mm) set``.
     """
     brackets = _BRACKETS.match(name)
     if brackets:
@@ -165,8 +176,9 @@ def stated_unit(name: str) -> tuple[str, str]:
     suffix = _SUFFIX.match(name)
     if suffix and ({plain_name(suffix["unit"]), suffix["unit"].lower()} & _SUFFIXES):
         return suffix["name"], suffix["unit"]
-    return name, ""
+    inside = _INSIDE.search(name)
+    return (_INSIDE.sub(" ", name, 1), inside["unit"]) if inside and _is_unit(inside["unit"]) else (name, "")
 
 
 def _is_unit(text: str) -> bool:
-    return plain_name(text) in POSITION_UNITS or time_unit(text) is not None
+    return position_unit(text) is not None or time_unit(text) is not None or plain_name(text).rstrip("s") in COUNTS

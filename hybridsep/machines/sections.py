@@ -311,6 +311,13 @@ class LogSection(Section):
         """Names of the columns by role."""
         return {name: value for name, value in self.table.items() if name in ("t", "x_d", "x", "error")}
 
+    def columns_beside(self, given: Mapping[str, str], T_s: float | None) -> dict[str, str]:
+        """Return these names and those that are ``given``, which count; with ``T_s`` there may be no times."""
+        names = {role: name for role, name in self.columns.items() if role != "t" or T_s is None} | dict(given)
+        if {"x_d", "x", "error"} <= names.keys():  # an error is in the place of a position
+            names.pop(next((role for role in ("error", "x", "x_d") if role not in given), ""), None)
+        return names
+
 
 def _own(*several: type[PredictorSettings | CompensatorSettings]) -> dict[str, Parameter]:
     return {name: one for its in several for name, one in its.parameters().items() if name not in its.ELSEWHERE}

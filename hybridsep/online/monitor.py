@@ -1,7 +1,7 @@
 """Monitor of the following error, as drives have one, and of measurements that are missing.
 
-Where a change of the command helps, the error behind the command as it came falls, and the one behind the command that
-was sent stays as it was without the change. Where it does not, for want of force or with a wrong sensor, both grow.
+Where a change of the command helps, the distance from the original command falls, and the distance from the modified
+command stays as it was without the change. Where force is lacking or the sensor is wrong, both grow.
 """
 
 import math
@@ -33,8 +33,8 @@ class Monitor:
     def take_in(self, error: float, change: float) -> bool:
         """Take in a sample's following error, measured position minus command as it came, m, and the command's change.
 
-        NaN where missing. Returns whether the error, and its geometric mean with the one behind the command that was
-        sent, are within the limit, and nothing has tripped: what is not is not learned.
+        NaN where missing. Returns whether the error, and its geometric mean with the error from the modified command,
+        are within the limit, and nothing has tripped: what is not is not learned.
         """
         self.n_taken += 1
         if math.isnan(error):

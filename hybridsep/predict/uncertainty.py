@@ -72,7 +72,7 @@ class Uncertainty:
     """Standard deviation of prediction errors, calibrated online."""
 
     theta: Array  # (_N_COMPONENTS,): ``θ``: variance of the noise, m², and of the others relative to their causes
-    evidence: Array  # (_N_COMPONENTS,): effective number of windows behind each ``θ``
+    evidence: Array  # (_N_COMPONENTS,): effective number of windows of each ``θ``
     factor: float  # ``c`` in the middle of a window
     ratio: float  # ``c`` at its end relative to that at its beginning
     recent: float  # m²: recent mean square of the residual; 0 before the first window

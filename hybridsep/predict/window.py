@@ -78,7 +78,7 @@ class PredictedWindow(NamedTuple):
 class WindowOperator:
     """The hybrid model over one window, affine in its commands; eq. (3).
 
-    ``x_h = G_h x_d + free`` with ``G_h`` lower-triangular Toeplitz, and the same for the physics model alone.
+    ``x_h = G_h x_d + free`` with ``G_h`` lower-triangular Toeplitz, and the same for only the physics model.
     """
 
     g_h: Array  # (n,), m/m: first column of ``G_h``

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from built_once import built_once
 from places import ROOT
+from quick_fits import with_short_references
 from rich.console import Console
 
 from benchmarks.pictures import RECORD, demonstrated
@@ -41,7 +42,9 @@ def shown_once(folder: Path, *, full: bool) -> Demonstration:
 
     def run(out: Path) -> None:
         fractions: list[float] = []
-        demo(out / "demo", full=full, progress=lambda _, done: fractions.append(done))
+        with pytest.MonkeyPatch.context() as patch:
+            with_short_references(patch)
+            demo(out / "demo", full=full, progress=lambda _, done: fractions.append(done))
         (out / "fractions.json").write_text(json.dumps(fractions), encoding="utf-8")
 
     out = built_once(folder, run)
@@ -122,6 +125,7 @@ def test_the_pictures_of_the_pages_show_these_figures(shown: Demonstration) -> N
 @pytest.mark.slow
 def test_the_spirals_case_draws_both_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first 0.3 s; all of it at night."""
+    with_short_references(monkeypatch)
     monkeypatch.setattr(cases, "spiral", lambda: [axis[:200] for axis in spiral()])
     said: list[str] = []
     summary = cases.spiral_case(tmp_path, said.append)

@@ -38,7 +38,7 @@ AT_NIGHT = [
     ids=lambda value: str(value),
 )
 def test_random_loops_command_the_same(seed: int, model: str, fixed: dict[str, float], tmp_path: Path) -> None:
-    loop = random_loop(seed, 1500, **fixed)
+    loop = random_loop(seed, 1000, **fixed)
     (x_library, states_library), (x_c, states_c) = (
         run(one, loop) for one in (LookAheadStream(model), CoreStream(model, tmp_path))
     )

@@ -100,7 +100,7 @@ def test_the_slope_is_that_of_the_prediction(period: float) -> None:
 def test_late_commands_are_predicted_and_not_changed(late: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The preview after them is the end of a longer one, whose first commands stay as they are."""
     sep, n = SepCompensator.from_bytes(learned(2e-3)), 200  # kept for other tests: not with what is set next
-    monkeypatch.setattr(newton, "_APART", 1)  # the window is another one, and what is after it
+    monkeypatch.setattr(newton, "_VARIANCE_STRIDE", 1)  # the window is another one, and what is after it
     x_d, basis = moves()[: late + n], SplineBasis(n, 2, n)
     whole, model = plan_model(sep, x_d), plan_model(sep, x_d, late)
     at, of_whole = model.predict(x_d[late:]), whole.predict(x_d)
@@ -118,7 +118,7 @@ def test_late_commands_are_predicted_and_not_changed(late: int, monkeypatch: pyt
 def test_samples_behind_the_window_share_a_variance(monkeypatch: pytest.MonkeyPatch) -> None:
     sep, x_d = SepCompensator.from_bytes(learned(2e-3)), moves()[:200]
     shared = plan_model(sep, x_d).predict(x_d)
-    monkeypatch.setattr(newton, "_APART", 1)
+    monkeypatch.setattr(newton, "_VARIANCE_STRIDE", 1)
     own = plan_model(sep, x_d).predict(x_d)
     np.testing.assert_array_equal(shared.e_h[:51], own.e_h[:51])  # the window, and one more
     assert 0.0 < np.std(shared.e_h - own.e_h) < 0.1 * np.std(own.e_h)

@@ -49,6 +49,7 @@ def python(folder: Path, *arguments: object) -> str:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("short_references")
 @pytest.mark.parametrize("system", OWN)
 @pytest.mark.parametrize(
     "importer",

@@ -119,6 +119,7 @@ def test_every_tag_is_one_that_omsimulator_takes(archive: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("short_references")
 def test_ssp_2_has_the_twins_of_fmi_3(tmp_path: Path) -> None:
     """SSP 2.0 has the namespaces of 1.0; without its version and the types of FMI 3.0 it is the same document."""
     machine, command = load_machine("spring_mass_damper"), staircase()[:100]

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 from places import ROOT
+from quick_fits import with_short_references
 
 from hybridsep.logs import formats
 
-ROWS = 2001  # lines of the example log that are left: of the others the pages tell
+ROWS = 1601  # lines of the example log that are left: of the others the pages tell
 
 
 @pytest.mark.slow
@@ -22,6 +23,7 @@ def test_a_log_becomes_a_compensated_loop_in_ten_cells(tmp_path: Path, monkeypat
         path.write_bytes(b"".join(lines[:ROWS]))
 
     monkeypatch.setattr(formats, "write_example", shorter)
+    with_short_references(monkeypatch)
     monkeypatch.chdir(tmp_path)
     notebook = json.loads((ROOT / "examples" / "log_to_loop.ipynb").read_text(encoding="utf-8"))
     cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]

@@ -10,7 +10,7 @@ from hybridsep.base.errors import ParameterError, SignalError
 from hybridsep.base.metrics import moves_of
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.evaluate.backtest import backtest
-from hybridsep.fitting.choice import choose_settings, settings_to_try, with_window
+from hybridsep.fitting.lags import choose_settings, settings_to_try, with_window
 from hybridsep.fitting.replay import Recording, beginnings, replay, split_log
 from hybridsep.model.physics import ModalModel
 from hybridsep.predict.predictor import HybridPredictor

@@ -206,7 +206,7 @@ def test_universal_files() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["FeedDrive", "FeedDriveFmi3"])
+@pytest.mark.parametrize("name", [pytest.param("FeedDrive", marks=pytest.mark.nightly), "FeedDriveFmi3"])
 def test_the_archive_without_binaries_can_be_compiled(
     fmus: BuiltFmus, tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -23,6 +23,8 @@ from hybridsep.fmi.spec import fmu_names, table_of
 from hybridsep.fmi.variables import INTERPOLATED
 from hybridsep.machines.machine import Machine, load_machine
 
+pytestmark = pytest.mark.usefixtures("short_references")
+
 MACHINE = load_machine("spring_mass_damper")
 
 

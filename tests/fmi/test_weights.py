@@ -20,6 +20,8 @@ from hybridsep.fmi.weights import restore_weights, weights_file
 from hybridsep.machines.machine import load_machine, paper_machine
 from hybridsep.predict.predictor import HybridPredictor
 
+pytestmark = pytest.mark.usefixtures("short_references")
+
 MACHINE = paper_machine("spring_mass_damper")
 
 

@@ -53,8 +53,8 @@ def test_a_lag_with_dead_time_is_found() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("sag", "friction"), [(60.0, 6.0), (0.0, 30.0)])
-def test_an_arm_that_sags_or_rubs_has_poles_not_a_dead_time(sag: float, friction: float) -> None:
+@pytest.mark.parametrize(("sag", "friction", "order_max"), [(60.0, 6.0, 2), (0.0, 30.0, 4)])
+def test_an_arm_that_sags_or_rubs_has_poles_not_a_dead_time(sag: float, friction: float, order_max: int) -> None:
     """A PD servo of 3.56 Hz, ζ 0.56, a sample late: sagging by cos(x) a lag and 58 ms, rubbed two modes, fit better."""
     x_d, T_s = _reaches(6000, 2e-3), 2e-3
     x, position, velocity = np.empty_like(x_d), x_d[0] - sag / 2000.0 * np.cos(x_d[0]), 0.0
@@ -64,7 +64,7 @@ def test_an_arm_that_sags_or_rubs_has_poles_not_a_dead_time(sag: float, friction
             rubs = 100.0 * velocity + friction * np.tanh(velocity / 0.01)
             velocity += (2000.0 * (late - position) - sag * np.cos(position) - rubs) / 4.0 * T_s / 8
             position += velocity * T_s / 8
-    found = identify_operation([(x_d, x)], T_s, unit="rad")
+    found = identify_operation([(x_d, x)], T_s, unit="rad", order_max=order_max)
     assert found.structure.startswith("second order, gain")
     assert found.model.dead_time <= 2
     assert value(found, "mode[1].f_n")[0] == pytest.approx(3.56, rel=0.2)
@@ -79,7 +79,7 @@ def test_poles_that_friction_does_not_explain_are_the_drives() -> None:
     discrete = ModalModel([Mode(20.0, 0.5, (40 * np.pi) ** 2)]).discretise(T_S)
     lag = np.exp(-16 * np.pi * T_S)
     x = lfilter([0.0, 1.0 - lag], [1.0, -lag], discrete.forced_response(discrete.rest(), x_d)[0])
-    found = identify_operation([(x_d, x + np.random.default_rng(1).normal(0.0, 1e-6, len(x)))], T_S)
+    found = identify_operation([(x_d, x + np.random.default_rng(1).normal(0.0, 1e-6, len(x)))], T_S, order_max=3)
     assert value(found, "mode[1].f_n")[0] == pytest.approx(20.0, rel=0.05)
     assert value(found, "mode[1].zeta")[0] == pytest.approx(0.5, rel=0.1)
 
@@ -166,7 +166,7 @@ def test_two_modes_are_found_with_a_gain() -> None:
     omegas = 2 * np.pi * np.array([25.0, 60.0])
     truth = ModalModel([Mode(25.0, 0.3, 0.72 * omegas[0] ** 2, 20.0), Mode(60.0, 0.1, 0.26 * omegas[1] ** 2, -10.0)])
     x_d = moves(1500)
-    found = identify_operation([(x_d, measured(truth, x_d, "foh", 1e-7))], T_S)
+    found = identify_operation([(x_d, measured(truth, x_d, "foh", 1e-7))], T_S, order_max=4)
     assert found.structure == "2 modes, gain free"
     assert sorted(value(found, f"mode[{i}].f_n")[0] for i in (1, 2)) == pytest.approx([25.0, 60.0], rel=0.01)
     assert value(found, "gain")[0] == pytest.approx(0.98, abs=1e-4)
@@ -208,12 +208,12 @@ def mode(f_n: float, zeta: float, gain: float, beta: float = 0.0) -> Mode:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("f_n", "gain"), [(1.0, 0.05), (2.0, 0.1)])
+@pytest.mark.parametrize(("f_n", "gain"), [(1.0, 0.05), pytest.param(2.0, 0.1, marks=pytest.mark.nightly)])
 def test_a_slow_part_beside_a_fast_loop_is_found(f_n: float, gain: float) -> None:
     """Feed-forward beside a slow integrator: a lag, or a mode that rings, left six tenths of the servo error."""
     x_d, truth = moves(8000), ModalModel([mode(60.0, 0.6, 1.0 - gain, 1.1), mode(f_n, 1.0, gain)], dead_time=1)
     x = measured(truth, rubbed(x_d, 20e-6), "foh", 5e-7)
-    found = identify_operation([(x_d, x)], T_S)
+    found = identify_operation([(x_d, x)], T_S, order_max=4)
     assert found.rms < 0.15 * np.std(x - x_d)
     assert min(one.f_n for one in found.model.modes) == pytest.approx(f_n, rel=0.25)
 
@@ -223,7 +223,7 @@ def test_a_flexible_mode_beside_a_velocity_loop_with_integrator_is_found() -> No
     """Three poles of the loop and two of the mode."""
     truth = ModalModel([mode(21.0, 0.03, 0.1), mode(23.0, 1.5, 1.9), lag_mode(0.06, -1.0)], dead_time=1)
     x_d = moves(6000)
-    found = identify_operation([(x_d, measured(truth, rubbed(x_d, 5e-6), "foh", 5e-7))], T_S)
+    found = identify_operation([(x_d, measured(truth, rubbed(x_d, 5e-6), "foh", 5e-7))], T_S, order_max=5)
     assert found.structure.startswith("2 modes and lag")
 
 
@@ -232,7 +232,7 @@ def test_a_slow_part_is_taken_where_it_repeats_though_its_fast_pole_is_not_known
     """A harmonic drive whose motor follows within a sample: its poles were refused, and a lag left seven tenths."""
     x_d, truth = moves(8000), ModalModel([lag_mode(1.6e-4, 0.94), lag_mode(1.0 / (3.4 * np.pi), 0.06)])
     x = measured(truth, rubbed(x_d, 20e-6), "foh", 5e-7)
-    assert identify_operation([(x_d, x)], T_S).rms < 0.25 * np.std(x - x_d)
+    assert identify_operation([(x_d, x)], T_S, order_max=3).rms < 0.25 * np.std(x - x_d)
 
 
 def test_slow_parts_that_cancel() -> None:
@@ -252,7 +252,7 @@ def test_a_mode_that_the_log_does_not_resolve_is_not_chosen() -> None:
     """With fewer than four samples a period a replay of the log would be refused."""
     x_d = moves(2000)
     fast = ModalModel([Mode(330.0, 0.05, (660 * np.pi) ** 2)])
-    found = identify_operation([(x_d, measured(fast, x_d, "foh", 1e-8))], T_S)
+    found = identify_operation([(x_d, measured(fast, x_d, "foh", 1e-8))], T_S, order_max=2)
     assert all(mode.zeta >= 1.0 or mode.f_n <= 0.25 / T_S for mode in found.model.modes)
 
 

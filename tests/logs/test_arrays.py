@@ -163,7 +163,7 @@ def test_nulls_times_structs_and_decimals(tmp_path: Path) -> None:
     np.testing.assert_allclose(log.x_d, np.round(X_D, 3), atol=1e-15)
     assert np.flatnonzero(np.isnan(log.x_meas)).tolist() == [30]
     assert log.T_s == 1e-3
-    refused(r"column 'note' must be numbers, got string", path, columns={**names, "x": "note"})
+    refused(r"column 'note' must be numbers: values of type str", path, columns={**names, "x": "note"})
 
 
 def test_units_in_the_metadata_of_fields(tmp_path: Path) -> None:

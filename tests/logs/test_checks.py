@@ -263,13 +263,26 @@ def test_an_error_tells_the_other_position(kept: str, name: str, sign: int) -> N
         assert np.isnan(read(columns={"error": right}).x_meas[9])
 
 
+@pytest.mark.parametrize("there", ["X_cmd X_act Y_cmd Y_act", "X_cmd - Y_cmd", "- X_act - Y_act", "- - cmd_2 ENcmd_2"])
+def test_an_errors_name_chooses_the_axis(there: str) -> None:
+    x_d, x = moves().x_d, moves().x_meas
+    of = [x_d, x, 0.5 * x_d, 0.5 * x]
+    table = {**dict(zip(there.split(), of, strict=False)), "X_err|1": x_d - x, "Y_err|2": 0.5 * (x_d - x)}
+    log = read_log(table, T_s=1e-3, columns={"error": "Y_err|2"})
+    np.testing.assert_allclose((log.x_d, log.x_meas), of[2:], atol=1e-15)
+    with pytest.raises(LogError, match=r"column 'Y_lag' \(error\) is missing, .*; name it: --error NAME"):
+        read_log(table, T_s=1e-3, columns={"error": "Y_lag"})
+
+
 def test_jumps_are_no_counter_that_wraps() -> None:
-    """Steps of 65 mm and a creep, a sensor that reads 0 at 65 mm, a log that goes on elsewhere, in counts of 1 µm."""
+    """Steps of 65 mm and a creep, a sensor that reads 0 at 65 mm, a log that goes on elsewhere, fast returns."""
     k = np.arange(3000.0)
     steps, slow = 0.065 * (k // 500 % 2) + 1e-6 * k, 0.065 + 1e-6 * np.round(400.0 * np.sin(k / 200.0))
     there = replace(log_of(np.append(slow, slow - 0.065), np.append(slow, slow - 0.065) + 1e-6), starts=(0, 3000))
-    for log in (log_of(steps, steps + 2e-6), log_of(slow, np.where(k == 700.0, 0.0, slow + 1e-6)), there):
-        assert "wraps" not in names(log)
+    raster = np.interp(k % 1000.0, [0.0, 980.0, 1000.0], [0.0, 0.02, 0.0])
+    faulty = log_of(slow, np.where(k == 700.0, 0.0, slow + 1e-6)), log_of(slow, np.where(k % 900.0 < 5.0, 0.0, slow))
+    for log in (log_of(steps, steps + 2e-6), *faulty, there, log_of(raster, raster + 1e-6)):
+        assert not {"wraps", "begins anew"} & {*names(log)}
 
 
 def test_a_quiet_sensors_swap_is_found_and_no_shift_is_offered() -> None:
@@ -306,6 +319,7 @@ NOTES: dict[str, Callable[[Log], Log]] = {
     "outliers": lambda log: replace(log, x_meas=log.x_meas + 0.1 * (np.arange(len(log.t)) == 500)),
     "clipped": lambda log: replace(log, x_meas=np.minimum(log.x_meas, 0.8 * float(log.x_meas.max()))),
     "moved at rest": lambda log: rested(log, 0.02),
+    "begins anew": lambda _log: log_of(2e-5 * np.arange(12000.0) % 0.02, 2e-5 * np.arange(-5.0, 11995.0) % 0.02),
 }
 
 

@@ -19,7 +19,6 @@ from hybridsep.logs.log import read_log
 @pytest.mark.parametrize(
     ("measured", "names", "read"),
     [
-        (("x",), {}, "x"),
         (("x_meas",), {}, "x_meas"),
         (("x", "x_meas"), {}, "x_meas"),
         (("x", "x_meas"), {"x": "x"}, "x"),
@@ -83,7 +82,7 @@ def test_columns_in_a_struct_are_guessed_beside_those_that_are_named(tmp_path: P
         assert {"x_d": "trace.pos.act_mm", "x": "trace.pos.set_mm"}[role] in named.columns.values()
 
 
-@pytest.mark.parametrize("unit", ["cm", "0um", "furlong", 1e-3, b"mm", ["mm"]])
+@pytest.mark.parametrize("unit", ["km", "0um", "furlong", 1e-3, b"mm", ["mm"]])
 def test_units_that_are_none(tmp_path: Path, unit: Any) -> None:
     path = write(tmp_path / "log.npz", columns())
     with pytest.raises(LogError, match=f"unit must be one of m, mm, .*, got {re.escape(repr(unit))}; a multiple is"):
@@ -94,10 +93,16 @@ def test_units_that_are_none(tmp_path: Path, unit: Any) -> None:
 
 @pytest.mark.parametrize(
     ("unit", "factor", "si"),
-    [("mm", 1e-3, "m"), ("nm", 1e-9, "m"), ("in", 0.0254, "m"), ("°", np.pi / 180, "rad"), ("rev", 2 * np.pi, "rad")],
+    [
+        ("cm", 1e-2, "m"),
+        ("nm", 1e-9, "m"),
+        ("mils", 2.54e-5, "m"),
+        ("arcsec", np.pi / 648e3, "rad"),
+        ("rev", 2 * np.pi, "rad"),
+    ],
 )
 def test_units(tmp_path: Path, unit: str, factor: float, si: str) -> None:
-    log = read_log(write_csv(tmp_path / "log.csv", f"t,x_d [{unit}],x [{unit}]\n0,1,2\n1,3,4\n"))
+    log = read_log(write_csv(tmp_path / "log.csv", f"t,x_d ({unit}),x [{unit}]\n0,1,2\n1,3,4\n"))
     np.testing.assert_allclose(log.x_meas, [2 * factor, 4 * factor], rtol=1e-15)
     assert (log.unit, log.unit_stated) == (si, True)
 

@@ -174,13 +174,8 @@ def test_gaps_of_one_channel_are_not_bridged(tmp_path: Path) -> None:
 # LinuxCNC halscope
 
 HAL = columns()
-JOINTS = {
-    "joint.0.pos-cmd": HAL["x_d"],
-    "joint.0.motor-pos-cmd": HAL["x_d"],
-    "joint.0.motor-pos-fb": HAL["x"],
-    "joint.1.pos-cmd": 2 * HAL["x_d"],
-    "joint.1.pos-fb": 2 * HAL["x"],
-}
+JOINTS = {f"joint.0.{pin}": HAL["x_d"] for pin in ("pos-cmd", "motor-pos-cmd")} | {"joint.0.motor-pos-fb": HAL["x"]}
+JOINTS |= {"joint.1.pos-cmd": 2 * HAL["x_d"], "joint.1.pos-fb": 2 * HAL["x"]}
 
 
 def test_joints_of_halscope(tmp_path: Path) -> None:
@@ -265,19 +260,13 @@ def test_capture(tmp_path: Path) -> None:
         (lambda c: c["Header"].update(CycleTimeMs=0), "time 't' must increase, it never does"),
         (lambda c: c["Header"].update(SignalListHFData=7), "must have Header.CycleTimeMs, the Name and Axis of each"),
         (lambda c: c["Header"]["SignalListHFData"][2].pop("Axis"), "the Name and Axis of each .*: KeyError: 'Axis'"),
-        (
-            lambda c: c["Payload"][0]["HFData"].insert(3, [1.0]),
-            "rows of as many numbers in each HFData of Payload: ValueError",
-        ),
-        (
-            lambda c: c["Payload"][3]["HFData"][4].__setitem__(1, "a"),
-            "ValueError: could not convert string to float: 'a'",
-        ),
+        (lambda c: c["Payload"][0]["HFData"].insert(3, [1.0]), "rows of as many numbers .* of Payload: ValueError"),
+        (lambda c: c["Payload"][3]["HFData"][4].__setitem__(1, "a"), "ValueError: could not .* to float: 'a'"),
         (lambda c: c["Payload"][3].update(HFData=None), "each HFData of Payload: TypeError"),
         (lambda c: c["Payload"][0]["HFData"][0].__setitem__(0, 10**400), "each HFData of Payload: OverflowError"),
         (
             lambda c: c["Payload"][0]["HFData"][1].__setitem__(3, math.nan),
-            r"sample 2 .* 'DES_POS\|4' must be finite, got nan",
+            r"sample 2 .*_POS\|4' must be finite, got nan",
         ),
     ],
 )

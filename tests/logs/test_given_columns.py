@@ -15,7 +15,7 @@ from log_files import refused
 import hybridsep
 from hybridsep.base.errors import HybridSepError, LogError, ParameterError, SignalError
 from hybridsep.base.signals import as_measured, as_samples
-from hybridsep.logs.log import read_log
+from hybridsep.logs.log import Table, read_log
 from hybridsep.logs.units import stated_unit
 
 N = 3000
@@ -89,6 +89,13 @@ MISSING: Mapping[str, Any] = {
     "fields": np.array(list(zip(X_D, GAPS, strict=True)), [("x_d", "f8"), ("x", "f8")]),
     "lazy": Lazy(x_d=X_D, x=GAPS),
 }
+
+
+class Dataset:
+    data_vars: Mapping[str, Any] = {}
+
+
+TABLES: list[Table] = [Frame(), Dataset(), np.zeros(3, [("x_d", "f8")]), 3.0]  # type: ignore[list-item]
 
 
 @pytest.mark.parametrize("how", MISSING)
@@ -229,7 +236,8 @@ OF_TOOLS = (
     "q_des[{}] | q[{}] @ 1; x_d({}) | x({}) @ 1; q_d[{}] | q[{}] | dq[{}] @ 2; _RPX | _TPX | _TEX; "
     "TPOS | APOS | POSERR; RPOS(X) | FPOS(X) | APOS(X) | TPOS(X); DPOS AXIS(0) | MPOS AXIS(0) | FE AXIS(0); "
     "goal_position | present_position | present_velocity; SetPos | ActPos | TargetPos; "
-    "RPOS | FPOS | DPOS | MPOS"
+    "RPOS | FPOS | DPOS | MPOS; action.pan.pos | observation.state.pan.pos; Sollwert_Weg | Istwert_Weg; "
+    "Group1.Pos.SetpointPosition | Group1.Pos.CurrentPosition | Group1.Pos.FollowingError"
 )
 """Commanded and measured position, then others, as controllers, drives and recorders call them; and the axis."""
 
@@ -251,6 +259,8 @@ def test_ticks_need_no_unit_where_the_interval_is_given() -> None:
 
 def test_units_of_names() -> None:
     assert stated_unit("Position, mm") == ("Position", "mm")
+    assert stated_unit("Position (mm) set") == ("Position set", "mm")
+    assert [stated_unit(f"x ({unit})")[1] for unit in ("0.1um", "counts", "X", "V")] == ["0.1um", "counts", "", ""]
     assert stated_unit("t_milliseconds") == stated_unit("t [milliseconds]") == ("t", "milliseconds")
     for name in ("Boom Ms", "Boom ms", "Room in", "q[0]", "q(1)", "x_m"):
         assert stated_unit(name) == (name, "")
@@ -269,7 +279,7 @@ def test_units_of_names() -> None:
 )
 def test_odd_arguments_are_refused_before_the_log_is_read(known: dict[str, Any], message: str) -> None:
     with pytest.raises(HybridSepError, match=message):
-        hybridsep.fit(None, **known)
+        hybridsep.fit(None, **known)  # type: ignore[arg-type]
 
 
 def test_messages_name_pythons_arguments_too() -> None:

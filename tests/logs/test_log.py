@@ -40,8 +40,8 @@ def test_every_format_gives_the_same_log_by_its_content(tmp_path: Path, suffix: 
         (b"MDF     4.10", "is ASAM MDF, which is not read; docs/howto/recorders.md has three lines of Python"),
         (b"TDSm", "is NI TDMS, which is not read; docs/howto/recorders.md has"),
         (b"PK\x03\x04" + bytes(30), "is an Excel workbook, or another zip .*; save its columns .* in Excel, or"),
-        (b'{"a": 1}', r"is JSON of another kind than Siemens Capture, .*; import pandas; pandas\.read_json"),
-        (b"<?xml version='1.0'?>", r"is XML of another kind than a SINUMERIK trace, .*; save its columns t"),
+        (b'{"a": 1}', r"is JSON, but no Siemens Capture, .*; import pandas; pandas\.read_json"),
+        (b"<?xml version='1.0'?>", r"is XML, but no SINUMERIK trace, .*; save its columns t"),
         (b"\x93NUMPY\x01\0", r"is a NumPy \.npy array, which is not read; numpy\.savez\('log\.npz', t=a"),
         (b"BZh91AY", r"is compressed, which is not read; unpack it, or compress it by gzip"),
         (bytes(range(256)), r"is in no format that is read \(NumPy \.npz, .*, text\); save its columns t, x_d and x"),
@@ -364,3 +364,6 @@ def test_whole_turns_are_unwrapped(tmp_path: Path, unit: str) -> None:
     log = read_log(write(tmp_path / "log.npz", data))
     np.testing.assert_allclose([log.x_d, log.x_meas], 2 * np.pi / turn * np.array([x_d, x]), atol=1e-9)
     assert "jumps of a whole turn, the first at sample " in log.remarks[0]
+    for name in (f"x_d [{unit}]", f"x [{unit}]"):  # of the other one there is the error
+        log = read_log({"t": data["t"], name: data[name], "error": x_d - x}, columns={"error": "error"})
+        np.testing.assert_allclose([log.x_d, log.x_meas], 2 * np.pi / turn * np.array([x_d, x]), atol=1e-9)

@@ -59,7 +59,10 @@ TWO_ROWS = "0,1,2\n1,3,4\n"
         "Zeit [ms];Solllage [mm];Istlage [mm]\n0;1000,0;2000\n1000;3000;4000\n",
         "time_ms,pos_sp_meter,pos_pv_meter\n0,1,2\n1000,3,4\n",
         "epoch_ms,q_des_inch,q_meter\n0,39.37007874015748,2\n1000,118.11023622047244,4\n",
-        # Rows with a key
+        "t;x_d;x\nms;mm;um\nSR1;CH1;CH2\n0;1000;2e6\n1000;3000;4e6\n",
+        # Units in cells, as MATLAB writes durations; rows with a key
+        "Time;x_d;x\n0 ms;1000 mm;2.0 m\n1000 ms;3000 mm;4.0 m\n",
+        "trace_path,time,Root/x_ref,Root/x_meas\ntrace_unit,s,mm,-\nvalues,0,1000,2\nvalues,1,3000,4\n",
         "Name;Zeit;Soll;Ist\nEinheit;ms;mm;mm\n;0;1000;2000\n;1000;3000;4000\n",
     ],
 )
@@ -97,6 +100,9 @@ def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
             "t,pos_act,pos_err\n0,1,2\n",
             r"name it: --x_d .*; or the error beside .*: --error=pos_err \(where .* --error=-pos_err\), in Python col",
         ),
+        ("# REM E-727\n# END\n0.5\t1\n0.7\t2\n0.9\t3\n", "has no line of names, its first line is numbers"),
+        ("t,x_d,x\nms,mm,mm\nx1,x0.5,x0.5\n0,1,2\n1,3,4\n", "the file has 'x1', 'x0.5'"),
+        ("t,x_d,x\n0 s,1,2\n1 min,3,4\n", "line 2: column 't' must be a number, got '0 s'$"),
         ("t,pos_err\n0,1\n", "an error alone tells neither position"),
         ("t,vel_cmd,vel_act\n0,1,2\n", r"columns 'x_d', 'x' are missing, .*; velocities are none: record positions$"),
         (

@@ -52,25 +52,14 @@ def in_seconds(times: Sequence[int]) -> str:
     return text.replace("t", "t [s]", 1)
 
 
-SPELLINGS = st.builds(
-    Spelling,
-    date=st.sampled_from(
-        ["%Y-%m-%dT", "%Y-%m-%d ", "%d.%m.%Y ", "%m/%d/%Y ", "%d/%m/%Y ", "%d-%b-%Y ", "%Y%m%dT", "%d.%m.%y  "]
-    ),
-    time=st.just("%H:%M:%S"),
-    end=st.sampled_from(["", "Z", "+00:00", " -0000", " UTC", " "]),
-    digits=st.integers(0, 9),
-    mark=st.sampled_from([".", ","]),
-    delimiter=st.sampled_from([";", "\t"]),
-) | st.builds(
-    Spelling,
-    date=st.sampled_from(["%m/%d/%Y ", "%m/%d/%Y, ", "%Y-%m-%d "]),
-    time=st.just("%I:%M:%S"),
-    end=st.sampled_from([" %p", "%p"]),
-    digits=st.integers(0, 9),
-    mark=st.just("."),
-    delimiter=st.sampled_from([";", "\t"]),
-)
+def spelled(dates: list[str], time: str, ends: list[str], marks: str) -> st.SearchStrategy[Spelling]:
+    of, digits = st.sampled_from, st.integers(0, 9)
+    return st.builds(Spelling, of(dates), st.just(time), of(ends), digits, of(marks), of(";\t"))
+
+
+DATES = ["%Y-%m-%dT", "%Y-%m-%d ", "%d.%m.%Y ", "%m/%d/%Y ", "%d/%m/%Y ", "%d-%b-%Y ", "%Y%m%dT", "%d.%m.%y  "]
+SPELLINGS = spelled(DATES, "%H:%M:%S", ["", "Z", "+00:00", " -0000", " UTC", " "], ".,")
+SPELLINGS |= spelled(["%m/%d/%Y ", "%m/%d/%Y, ", "%Y-%m-%d "], "%I:%M:%S", [" %p", "%p"], ".")
 START = st.integers(0, 2**31 * SECOND)  # 1970 to 2038
 
 

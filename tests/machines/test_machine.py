@@ -11,7 +11,7 @@ from hybridsep import Encoder, Limits, load_machine, machine_names, simulate, sp
 from hybridsep.base.errors import MachineError
 from hybridsep.base.settings import PARAMETERS, CompensatorSettings, PredictorSettings
 from hybridsep.machines.machine import Machine, machine_from_table, machine_path, machine_text
-from hybridsep.machines.sections import Physics, SpringMassDamper, StageSection
+from hybridsep.machines.sections import LogSection, Physics, SpringMassDamper, StageSection
 
 GOOD = """
 name = "axis"
@@ -327,3 +327,15 @@ def test_messages_are_one_line_of_a_reasonable_length(tmp_path: Path, text: str,
         load_machine(path)
     assert len(str(caught.value)) < 1000
     assert "\n" not in str(caught.value)
+
+
+OPTIONS = "x_d x | x T_s | x_d x; x_d x | error | x_d error; x_d x | x error | x error; x_d error | x | x_d x; "
+OPTIONS += "x error | x_d | x x_d; x error | error | x error; t x_d error | x_d | t x_d error; t x | x T_s | x"
+
+
+@pytest.mark.parametrize("one", OPTIONS.split("; "))
+def test_an_error_and_the_position_that_it_stands_for_are_not_both_named(one: str) -> None:
+    own, given, named = map(str.split, one.split(" | "))
+    options = dict.fromkeys({*given} - {"T_s"}, "given")
+    found = LogSection(table=dict.fromkeys(own, "own")).columns_beside(options, 1e-3 if "T_s" in given else None)
+    assert found == {role: options.get(role, "own") for role in named}

@@ -1,4 +1,4 @@
-"""The fixture behind the tests that every implementation runs."""
+"""The fixture of the tests that every implementation runs."""
 
 from collections.abc import Iterator
 from pathlib import Path

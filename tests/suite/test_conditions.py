@@ -154,7 +154,7 @@ def test_growing_and_ringing_are_predicted_as_by_the_library(new_stream: StreamM
     assert_agreement(new_stream, growing(new_stream.model), AVERAGING | {"Np": 50, "p": 20})
 
 
-@on_all((PREDICTOR, STAGE_PREDICTOR), needs="agreement")
+@on_all((PREDICTOR,), needs="agreement")
 @pytest.mark.parametrize(
     ("name", "factor", "saved_at", "leading"),
     [
@@ -169,7 +169,6 @@ def test_a_changed_plant_is_relearned_as_by_the_library(
 ) -> None:
     """The state that is saved has what was learned in earlier runs and in this one, or what is left of it."""
     model = new_stream.model
-    name = {"k": "kappa", "c_nl": "f"}.get(name, "f") if model == STAGE_PREDICTOR else name
     inputs, weights = changed(model, name, factor), learned(model, leading)
     expected = of_library(model, inputs, AVERAGING, weights)
     assert_same(run(new_stream.planted(weights), *inputs, AVERAGING, saved_at=saved_at), expected)

@@ -37,10 +37,10 @@ def driven(stream: Stream, values: dict[str, Value], told: Array, *, saved_at: i
     plant, encoder = machine.new_plant(), Encoder(5e-6, 1)
     plant.reset(0.0)
     stream.initialise(values)
-    outputs, x, x_meas = [stream.outputs()], np.zeros(N), 0.0
+    outputs, x, x_meas = [stream.outputs()], np.zeros(len(told)), 0.0
     late = int(values.get("measurement_delay", 0))
     arrive = [0.0] * max(0, late)
-    for k in range(N):
+    for k in range(len(told)):
         if k == saved_at:
             stream.restore(stream.save())
         x[k], x_meas = plant.x, encoder.measure(plant.x)
@@ -53,7 +53,7 @@ def driven(stream: Stream, values: dict[str, Value], told: Array, *, saved_at: i
             stream.set(name, float(value))
         stream.step(k * T_S, T_S)
         outputs.append(stream.outputs())
-    return np.array(outputs), r[: N - PREVIEW] - x[PREVIEW:]
+    return np.array(outputs), r[: len(told) - PREVIEW] - x[PREVIEW:]
 
 
 @cache
@@ -73,7 +73,7 @@ def test_plans_make_up_for_it(new_stream: StreamMaker) -> None:
 @pytest.mark.parametrize("kind", ["averaging", "paper"])
 def test_it_counts_from_its_first_value(new_stream: StreamMaker, kind: str) -> None:
     """A weight that the axis carries from the start on moves nothing, and is learned as any rest."""
-    given, none = (driven(new_stream(), LOADS[kind], told)[0] for told in (np.full(N, 3e-3), np.zeros(N)))
+    given, none = (driven(new_stream(), LOADS[kind], np.full(400, told))[0] for told in (3e-3, 0.0))
     np.testing.assert_array_equal(given, none)
 
 

@@ -14,6 +14,7 @@ from c_compiler import build_folder
 
 from hybridsep import build_fmu, fmu_names, load_machine, machine_names
 from hybridsep.fmi.flavours import FLAVOURS
+from hybridsep.fmi.reference import _SAMPLES_MAX
 from hybridsep.machines.machine import Machine
 
 _FMUS = {
@@ -107,7 +108,9 @@ class BuiltFmus:
 
         def build(unfinished: Path) -> None:
             folder = unfinished.with_suffix(".d")
-            made = build_fmu(machine, name, folder, flavour, targets=targets, weights=weights, fmi=fmi)
+            with pytest.MonkeyPatch.context() as patch:  # a reference as users get it, whatever the test has
+                patch.setattr("hybridsep.fmi.reference._SAMPLES_MAX", _SAMPLES_MAX)
+                made = build_fmu(machine, name, folder, flavour, targets=targets, weights=weights, fmi=fmi)
             os.replace(made, unfinished)  # noqa: PTH105
 
         return built_once(folder / f"{name}.fmu", build)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from programs import output_of
+from quick_fits import with_short_references
 from staircase_data import commanded, measured
 
 from hybridsep.app import cli, console
@@ -19,6 +20,7 @@ class Run:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
         self.monkeypatch, self.capsys = monkeypatch, capsys
+        with_short_references(monkeypatch)
 
     def __call__(self, *arguments: object) -> tuple[int, str, str]:
         self.monkeypatch.setattr(sys, "argv", ["hybridsep", *map(str, arguments)])

@@ -1,6 +1,6 @@
 """Random calls of an FMU's functions of FMI 2.0 or 3.0, and tables that were changed.
 
-Run as a program: ``python tests/support/fuzz_fmi.py FOLDER --seconds 600 --seed 1``, with an unpacked FMU, best one
+Run as a program: ``python tests/support/fuzz_fmi.py FOLDER --seconds 600 --seed 1``, with unpacked FMUs, best ones
 whose library has sanitizers and counts its blocks (``-include tests/c/counted.h``). A finding is a crash, a sanitizer's
 report, or one of the checks here: a refusal without a message, a refused step that changed a value, a damaged table
 that was taken, a block of memory that was not given back.
@@ -10,11 +10,11 @@ import argparse
 import random
 import shutil
 import struct
-import sys
 import tempfile
 import time
 import zlib
 from ctypes import byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p, create_string_buffer
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -336,16 +336,17 @@ class Fuzzer:
 def main() -> None:
     """Run the fuzzer from the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--seconds", type=float, default=30.0)
+    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("--seconds", type=float, nargs="+", default=[30.0], help="of each folder, the last one's again")
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as place:
-        scratch = shutil.copytree(arguments.folder / "resources", Path(place) / "resources")
-        fuzzer = Fuzzer(arguments.folder.resolve(), scratch, arguments.seed)
-        fuzzer.run(arguments.seconds)
-    counts = f"{fuzzer.calls} calls, {fuzzer.refused} refused, {fuzzer.steps} steps"
-    sys.stdout.write(f"{counts}, no finding (seed {arguments.seed})\n")
+    for folder, seconds in zip_longest(arguments.folders, arguments.seconds, fillvalue=arguments.seconds[-1]):
+        print(f"{folder.name}: ", end="", flush=True)
+        with tempfile.TemporaryDirectory() as place:
+            scratch = shutil.copytree(folder / "resources", Path(place) / "resources")
+            fuzzer = Fuzzer(folder.resolve(), scratch, arguments.seed)
+            fuzzer.run(seconds)
+        print(f"{fuzzer.calls} calls, {fuzzer.refused} refused, {fuzzer.steps} steps, no finding")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""``fit`` without what takes most of its time, for tests of other things."""
+"""``fit``, and the building of FMUs, without what takes most of their time, for tests of other things."""
 
 import pytest
 
@@ -13,5 +13,10 @@ def without_larger_structures(patch: pytest.MonkeyPatch) -> None:
 
 def without_other_settings(patch: pytest.MonkeyPatch) -> None:
     """Let ``fit`` try only the default settings: a fifth of its time."""
-    patch.setattr("hybridsep.fitting.choice._SHARES", ())
-    patch.setattr("hybridsep.fitting.choice._Q", ())
+    patch.setattr("hybridsep.fitting.lags._SHARES", ())
+    patch.setattr("hybridsep.fitting.lags._Q", ())
+
+
+def with_short_references(patch: pytest.MonkeyPatch) -> None:
+    """Let look-aheads that are built have reference runs of 30 samples: most of the time of a SepCompensator."""
+    patch.setattr("hybridsep.fmi.reference._SAMPLES_MAX", 30)

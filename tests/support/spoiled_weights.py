@@ -36,7 +36,7 @@ def spoiled(content: bytes) -> tuple[dict[str, bytes], dict[str, bytes]]:
         "nothing": b"",
         "no checksum": content[:-1],
         "a number that was changed": content[:-16] + bytes([content[-16] ^ 1]) + content[-15:],
-        "a checksum alone": sealed(b""),
+        "only a checksum": sealed(b""),
         "a head that is cut": sealed(body[:20]),
         "another version": sealed(b"HSEPWG00" + body[8:]),
         "settings that are cut": sealed(body[: _HEAD + 40]),

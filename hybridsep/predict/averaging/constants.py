@@ -32,7 +32,7 @@ class AveragingConstants:
     # samples by which the command may act before the physics model's dead time is over, or half of the dead time, if
     # that is more: where it is two samples too long, which no weight can mend, a warm drive leaves 1.7 times the error
     # of no compensation instead of 0.25
-    early: int = 2
+    dead_time_margin: int = 2
     # bound on the least variance of the noise relative to the largest mean square of a window: a larger ``lambda``
     # would prevent any learning
     least_noise: float = 1e-6
@@ -79,7 +79,7 @@ class AveragingConstants:
     # time in which a recalled residual loses that it was moved to the last one, in windows: without an end, drives that
     # are repeated have to 7 times the error
     recall_fade: float = 0.5
-    # repeats, behind a compensator, from which on one more changes the memory of a part by a share: without, what the
+    # repeats, under a compensator, from which on one more changes the memory of a part by a share: without, what the
     # physics model has wrong grows from pass to pass, and the tenth of a belt axis has 1.3 times the error
     recall_repeats: float = 3.5
     recall_share: float = 0.7

@@ -124,7 +124,7 @@ class SolvedExpert(NamedTuple):
         largest_square: float,
         bound: float,
         held: ExpertPrediction | None = None,
-        counts: NDArray[np.intp] | None = None,
+        variance_rows: NDArray[np.intp] | None = None,
     ) -> ExpertPrediction:
         """Predict the residual over a window in free run.
 
@@ -134,7 +134,7 @@ class SolvedExpert(NamedTuple):
 
         ``rows``, (n, n_static): features of the window without lags; ``past``, (≥ p,), m: last residuals, newest
         first; ``largest_square``, m²: largest mean square of a window; ``bound``, m: on the prediction; ``held``:
-        prediction whose shrinking is held; else it is computed; ``counts``, (n,): sample whose row counts for the
+        prediction whose shrinking is held; else it is computed; ``variance_rows``, (n,): sample whose row gives the
         variance of each sample; its own if left out.
         """
         w_e = self.lag_weights
@@ -149,10 +149,10 @@ class SolvedExpert(NamedTuple):
         else:
             lagged = lags(np.concatenate((past[:p][::-1], e[:-1])), p) if p else np.empty((len(e), 0))
             features = np.hstack((rows, lagged))
-            if counts is None:
+            if variance_rows is None:
                 leverage = self.solution.leverage(features)
             else:
-                places, back = np.unique(counts, return_inverse=True)
+                places, back = np.unique(variance_rows, return_inverse=True)
                 leverage = self.solution.leverage(features[places])[back]
             variance = self.variance * leverage
             if p:
@@ -287,7 +287,7 @@ class Regression(Expert):
         return solve(rows, variance, priors, p if like.has_lags else 0)
 
     def predict(
-        self, at: ExpertWindow, held: ExpertPrediction | None, counts: NDArray[np.intp] | None
+        self, at: ExpertWindow, held: ExpertPrediction | None, variance_rows: NDArray[np.intp] | None
     ) -> ExpertPrediction:
         """Return the prediction of its residual, once it knows something; parameters as for SolvedExpert.predict."""
         model, kind, most = at.model, self.like(at.model).target, at.bound
@@ -297,7 +297,7 @@ class Regression(Expert):
             square *= at.growth**2
             most = CONSTANTS.bound * (at.growth * scale.largest)
             rows = model.static.command.rows(model.run.static.x_d, at.window.x_d)
-        return at.solved[self].predict(rows, model.run.past[kind], square, most, held, counts)
+        return at.solved[self].predict(rows, model.run.past[kind], square, most, held, variance_rows)
 
     def forecast(self, at: ExpertWindow) -> Array | float:
         """Return what it adds to the physics model, within bounds.

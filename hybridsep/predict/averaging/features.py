@@ -39,7 +39,7 @@ class CommandFeatures:
     @classmethod
     def of(cls, dead_time: int) -> "CommandFeatures":
         """Return the features for a physics model's dead time, samples: half of it may be wrong."""
-        return cls(max(dead_time - max(CONSTANTS.early, dead_time // 2), 0))
+        return cls(max(dead_time - max(CONSTANTS.dead_time_margin, dead_time // 2), 0))
 
     @property
     def p(self) -> int:
@@ -116,7 +116,7 @@ class StaticRows(NamedTuple):
     """Features of a window."""
 
     rows: Array  # (n, n_static)
-    after: StaticState  # the state behind it
+    after: StaticState  # the state after it
     # (n, n_disturbances) and (n, N_STOPS), m: before they are filtered, and the stop operators
     disturbances: Array
     stops: Array

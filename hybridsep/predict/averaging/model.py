@@ -255,12 +255,12 @@ class AveragedModel:
         window: ResidualWindow,
         scales: FeatureScales,
         like: AveragedForecast | None = None,
-        counts: NDArray[np.intp] | None = None,
+        variance_rows: NDArray[np.intp] | None = None,
         of_physics: StaticRows | None = None,
     ) -> AveragedForecast:
         """Predict as :meth:`forecast` by the regressions of :meth:`solved`.
 
-        ``like``: under other commands, with the same path: its shrinking is held; ``counts``, (n,): as
+        ``like``: under other commands, with the same path: its shrinking is held; ``variance_rows``, (n,): as
         :meth:`~hybridsep.predict.averaging.experts.SolvedExpert.predict` has it; ``of_physics``: features of the window
         for ``x_pb``, if they are known.
         """
@@ -270,10 +270,12 @@ class AveragedModel:
         of_physics = of_physics or self.static.rows(self.run.static, window, x, scales.velocity)
         at = ExpertWindow(self, window, solved, scales, of_physics.rows, {}, recalled)
         if STATIC in solved:
-            # The stiffness acts at the position, which the physics model by itself does not give well enough.
-            x = x + STATIC.predict(at, held.get(STATIC), None).e_h
+            # The stiffness acts at the position, which the physics model by itself does not give well enough. Both
+            # predictions are shrunk alike, so that other commands have the same model.
+            at_first = STATIC.predict(at, held.get(STATIC), variance_rows)
+            x, held = x + at_first.e_h, {**held, STATIC: at_first}
             at = replace(at, rows=self.static.rows(self.run.static, window, x, scales.velocity, of_physics).rows)
-        predictions = {one: one.predict(at, held.get(one), counts) for one in solved}
+        predictions = {one: one.predict(at, held.get(one), variance_rows) for one in solved}
         at, stacked = replace(at, predictions=predictions), np.empty((len(EXPERTS), len(x)))
         for one in EXPERTS:
             stacked[one.place] = one.forecast(at)
@@ -367,7 +369,7 @@ def _folded(
 ) -> AveragedModel:
     """Learn the rows of a window, without lags, and its residuals, of the physics model and of the command."""
     settings, n = state.settings, len(e[MODEL_RESIDUAL])
-    early = settings.Np - min(settings.Np // 2, _AHEAD)
+    first = slice(settings.Np - min(settings.Np // 2, _AHEAD))
     forgetting_factor = math.exp(-n * settings.T_s / settings.forgetting) if settings.forgetting > 0.0 else 1.0
 
     def taken(kind: int) -> tuple[Array, Array, Array]:
@@ -383,9 +385,9 @@ def _folded(
         )
         return of_physics, of_command
 
-    state = replace(state, evidence=learned((one.discount(forgetting_factor) for one in state.evidence), slice(early)))
-    state = state.with_noise(_judged_experts(state, forecast, (e[0][:early], e[1][:early]), accepted[:early]))
-    return replace(state, evidence=learned(state.evidence, slice(early, n)))
+    state = replace(state, evidence=learned((one.discount(forgetting_factor) for one in state.evidence), first))
+    state = state.with_noise(_judged_experts(state, forecast, (e[0][first], e[1][first]), accepted[first]))
+    return replace(state, evidence=learned(state.evidence, slice(first.stop, n)))
 
 
 def _judged_experts(

@@ -1,12 +1,12 @@
-"""Memory of a run for recall: what the physics model missed the last time that the machine was told the same.
+"""Memory of a run for recall: what the physics model missed the last time that it got the same commands.
 
 Most axes repeat: a part program, a pick and place, a test signal. The memory has the commands as they came, and the
 residuals. For each lag ``τ`` a sum ``D_τ ← γ D_τ + (Δu(k) − Δu(k−τ))²`` of changes ``Δu`` over some samples follows how
 much the commands ahead, and those before them, are like those ``τ`` samples before; it fades in as many as are
 predicted. The lag with the least gives the residuals that were measured then. Under a compensator it is the shortest
-of those that are alike: what the drive was told then is most like what it is told now. They count by
+lag whose sum is small: the modified command of that time is most like the one now. The residuals count by
 ``1/(1 + (D_τ/S)/ρ²)``, with the same sum ``S`` of the changes themselves, and a tolerance ``ρ``. There a part that came
-some times is remembered as a mean, which fades: with the last one alone what the physics model has wrong would grow.
+several times is remembered as a fading mean: with only the last one, what the physics model has wrong would grow.
 """
 
 import math
@@ -94,7 +94,7 @@ class Memory:
         return self.residuals[place : place + n], float(self.residuals[place - 1]), alike
 
     def remember(self, e: Array, n: int = 0) -> "Memory":
-        """Return the memory with residuals of measured samples, ``(m,)``, m; ``n``: behind a compensator, as above."""
+        """Return the memory with residuals of measured samples, ``(m,)``, m; ``n``: under a compensator, as above."""
         m, (place, alike) = len(e), self.found(n, modified=True) if n else (0, 0.0)
         then, repeats = (self.residuals, alike * (self.repeats + 1.0)) if place else (e, np.zeros(m))
         then, repeats = then[place : place + m], repeats[place : place + m]

@@ -222,11 +222,7 @@ def open_source(
     read.
     """
     own = machine.log
-    columns, unit = {**own.columns, **given.columns}, given.unit or own.unit
-    if "error" in given.columns:  # in the place of a position
-        columns.pop("x_d" if "x" in given.columns else "x", None)
-    if given.T_s is not None and "t" not in given.columns:
-        columns.pop("t", None)  # there may be none
+    columns, unit = own.columns_beside(given.columns, given.T_s), given.unit or own.unit
     T_s = check_reading(unit, given.T_s)
     reading = Reading(columns, unit, machine.unit)
     udp = _UDP.fullmatch(address)

@@ -42,7 +42,7 @@ HSEP_API void hsep_compensator_block_init(
     self->error_max = parameters->compensator.following_error_max;
     self->state = self->before = self->compensate > HSEP_SEP_PHYSICS ? HSEP_SEP_PHYSICS : self->compensate;
     for (hsep_int i = 1; i <= hsep_late(&parameters->settings); i++) {
-        hsep_at(self, self->x_dm)[-i] = start;
+        *(hsep_at(self, self->x_dm) - i) = start;
     }
     /* The spline filtered by the physics model from rest, which is constant. */
     hsep_physics *trial = compensator_trial(self);
@@ -297,8 +297,8 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     }
 }
 
-/* Count errors behind the command, m, that are missing (NaN), or too large, by themselves or in the mean with the one
- * behind the changed command; return whether all is well, and may be learned: online/monitor.py, which says why. */
+/* Count following errors, m, that are missing (NaN), or too large, by themselves or in the mean with the error from the
+ * modified command; return whether all is well, and may be learned: online/monitor.py, which says why. */
 static int compensator_monitor(hsep_compensator *self, hsep_real error, hsep_real change)
 {
     if (isnan(error)) {
@@ -335,14 +335,14 @@ HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead
     hsep_predictor *predictor = hsep_compensator_predictor(self);
     self->first_load = predictor->k == 0 ? self->x_load : self->first_load;
     hsep_at(self, self->loads)[predictor->k % predictor->preview] = self->x_load - self->first_load;
-    const hsep_int i = predictor->k % predictor->Np - predictor->late;
-    const hsep_real *x_d = hsep_at(predictor, predictor->x_d);
-    hsep_real *x_dm = hsep_at(self, self->x_dm);
+    const hsep_int i = predictor->k % predictor->Np; /* of what is measured */
+    const hsep_real *x_d = hsep_at(predictor, predictor->x_d) - predictor->late;
+    hsep_real *x_dm = hsep_at(self, self->x_dm) - predictor->late;
     const hsep_real error = (predictor->early ? predictor->next : x_meas) - x_d[i];
     const int is_sound = compensator_monitor(self, error, x_dm[i] - x_d[i]) || !self->averaged;
     if (hsep_predictor_take_in(predictor, x_d_ahead, x_meas, is_sound)) {
         hsep_predictor_finish(predictor);
-        hsep_copy(x_dm - predictor->late, x_dm + predictor->Np - predictor->late, predictor->late);
+        hsep_copy(x_dm, x_dm + predictor->Np, predictor->late);
         hsep_planner_next(hsep_compensator_planner(self), hsep_at(predictor, predictor->x_d));
         compensator_begin_loads(self);
         hsep_compensator_begin(self);

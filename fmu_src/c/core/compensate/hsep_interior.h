@@ -111,12 +111,13 @@ static void interior_step(hsep_problem it, hsep_real *alpha_p, hsep_real *alpha_
 /* mu after the predictor's step, as far as s and z stay >= 0. */
 static hsep_real interior_predicted(hsep_problem it)
 {
-    hsep_real alpha_p, alpha_d, sums[2] = {0.0, 0.0}; /* two side by side, whatever a vector holds */
+    hsep_real alpha_p, alpha_d, sum = 0.0, other = 0.0; /* two side by side, whatever a vector holds */
     interior_step(it, &alpha_p, &alpha_d);
-    for (hsep_int r = 0; r < it.m; r++) {
-        sums[r % 2] += (it.s[r] + alpha_p * it.ds[r]) * (it.z[r] + alpha_d * it.dz[r]);
+    for (hsep_int r = 0; r < it.m; r += 2) {
+        sum += (it.s[r] + alpha_p * it.ds[r]) * (it.z[r] + alpha_d * it.dz[r]);
+        other += (it.s[r + 1] + alpha_p * it.ds[r + 1]) * (it.z[r + 1] + alpha_d * it.dz[r + 1]);
     }
-    return (sums[0] + sums[1]) / (hsep_real)it.m;
+    return (sum + other) / (hsep_real)it.m;
 }
 
 /* Go by the corrector's step, as far as s and z stay > 0; return the primal length. */

@@ -4,10 +4,10 @@
  * for friction, and 2 |x| for stiffness. Stop operators, the weights of the experts and of the stack, and the shrinking
  * by the variance, are held constant:
  *
- *   dx_h = (1 - pi_A) G_pb + pi_L df_L + pi_S df_S + pi_A dx_A
+ *   dx_h = (1 - pi_c) G_pb + sum_i pi_i df_i + pi_c dx_c
  *
- * The expert of only the command, A, is linear and time-invariant: its features are increments and lags of the
- * command. The expert D, which doubts earlier runs, counts as the expert whose counterpart it is.
+ * c is arx_command, linear and time-invariant: its features are increments and lags of the command. i are arx_residual
+ * and static; fresh_start, which doubts earlier runs, counts as the expert whose counterpart it is.
  */
 #ifndef HSEP_LINEARISED_H
 #define HSEP_LINEARISED_H
@@ -107,7 +107,7 @@ static hsep_int linearised_first(const hsep_linearised *self, const hsep_average
 }
 
 /* Gains of an expert, (n,) each, from a change of v_d, x and v to its prediction: of friction, position and damping and
- * of their differences, as filters of v_d and x alone. weights: of the disturbances, then of their differences. */
+ * of their differences, as filters of only v_d and x. weights: of the disturbances, then of their differences. */
 static void linearised_gains(hsep_linearised *self, const hsep_real weights[], hsep_real T_s, hsep_real gains[])
 {
     const hsep_real *slopes = hsep_at_const(self, self->slopes);
@@ -209,7 +209,7 @@ static void linearised_slopes(
 }
 
 /* Begin to linearise a model that has learned, for a change of the commands that may begin at any sample of the
- * preview: what does not depend on the commands. change: (preview,) m, oldest first, nothing behind the first n;
+ * preview: what does not depend on the commands. change: (preview,) m, oldest first, 0 after the first n;
  * passed: the same after G_pb. */
 static void hsep_linearised_begin(
     hsep_linearised *self, hsep_averaged *model, const hsep_real change[], const hsep_real passed[], hsep_int n)
@@ -225,8 +225,8 @@ static void hsep_linearised_begin(
         position[u] = passed[u];
     }
     self->moves = hsep_min(n + 2, self->preview);
-    /* What is neither friction nor stiffness: the change behind G_pb, and as late as the experts of the command take
-     * it, and their response to it */
+    /* What is neither friction nor stiffness: the change filtered by G_pb, and as late as the experts of the command
+     * take it, and their response to it */
     const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
     hsep_real *base = hsep_at(self, self->base);
     hsep_copy(base, passed, self->preview);
@@ -348,7 +348,7 @@ static void linearised_add(
     }
     hsep_physics_abreast(
         filters, HSEP_PHYSICS_ABREAST, hsep_at(self, self->disturbance), hsep_at(self, self->drive), (size_t)padded);
-    hsep_real *lags = hsep_at(self, self->lags); /* each as often as a vector has lanes, and zeros behind them */
+    hsep_real *lags = hsep_at(self, self->lags); /* each as often as a vector has lanes, then zeros */
     for (hsep_int l = 0; l < HSEP_LANES * (expert->p + LINEARISED_TOGETHER - 1); l++) {
         lags[l] = l < HSEP_LANES * expert->p ? hsep_expert_weights(expert)[expert->n_static + l / HSEP_LANES] : 0.0;
     }

@@ -110,7 +110,7 @@ static hsep_real newton_doubt(hsep_newton *self, const hsep_newton_task *task)
 /* Samples that the splines begin with, which are solved for. */
 static hsep_int *newton_begins(hsep_newton *self) { return hsep_part(self, self->begins); }
 
-/* A spline with this distance of knots, or it behind G_pb, (preview,), of shapes or passed. */
+/* A spline with this distance of knots, or filtered by G_pb, (preview,), of shapes or passed. */
 static hsep_real *newton_level(hsep_newton *self, hsep_int of, hsep_int level)
 {
     return hsep_at(self, of) + level * self->preview;
@@ -149,19 +149,19 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
     hsep_linearised *linearised = hsep_part(self, self->linearised);
     hsep_real *columns[HSEP_PHYSICS_ABREAST] = {NULL};
     const hsep_knot knot = hsep_knots_at(&task->planner->knots, first);
-    const hsep_int apart = spacing << knot.level, from = newton_begins(self)[first];
+    const hsep_int distance = spacing << knot.level, from = newton_begins(self)[first];
     if (first == knot.first) {
         hsep_linearised_begin(
             linearised, task->model, newton_level(self, self->shapes, knot.level),
-            newton_level(self, self->passed, knot.level), 4 * apart);
+            newton_level(self, self->passed, knot.level), 4 * distance);
     }
     for (hsep_int c = 0; c < count; c++) {
-        columns[c] = hsep_at(self, self->W) + ((first + c) * self->preview + from + c * apart);
+        columns[c] = hsep_at(self, self->W) + ((first + c) * self->preview + from + c * distance);
     }
-    hsep_linearised_columns(linearised, task->model, from, apart, count, columns);
+    hsep_linearised_columns(linearised, task->model, from, distance, count, columns);
     for (hsep_int c = 0; c < count; c++) {
-        for (hsep_int k = from + c * apart; k < self->preview; k++) {
-            columns[c][k - from - c * apart] *= weight[k];
+        for (hsep_int k = from + c * distance; k < self->preview; k++) {
+            columns[c][k - from - c * distance] *= weight[k];
         }
     }
     self->spline += count;
@@ -204,7 +204,7 @@ HSEP_API void hsep_newton_init(
         const hsep_real left = (hsep_real)(preview - k) / (hsep_real)(preview - full + 1);
         weight[k] = k < full ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
     }
-    for (hsep_int i = 0; i < self->m; i++) { /* splines of each distance of knots, and W with the physics model alone */
+    for (hsep_int i = 0; i < self->m; i++) { /* splines of each distance of knots, and W with only the physics model */
         const hsep_knot knot = hsep_knots_at(&plans->knots, i);
         const hsep_int begin = (plans->n_pinned + knot.begin) * spacing;
         hsep_real *shape = newton_level(self, self->shapes, knot.level),
@@ -301,7 +301,7 @@ static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
     newton_copy(self, hsep_planner_coefficients(task->planner), hsep_at(self, plan));
 }
 
-/* What parts of a plan count as: columns abreast by an expert; some variances, or those behind the window, which take
+/* What parts of a plan count as: columns abreast by an expert; some variances, or those after the window, which take
  * more samples; what passes through the model or the solver once, for all samples of a plan; and half a prediction of a
  * plan, the slopes under it, or the jerk of a programme. */
 #define NEWTON_COLUMNS 3
@@ -343,36 +343,36 @@ static hsep_int newton_of_plan(hsep_newton *self, const hsep_newton_task *task, 
         step += newton_of_columns(self, task, i);
     }
     return NEWTON_SOME * newton_parts(window - predicted, HSEP_NEWTON_VARIED) +
-           NEWTON_BEHIND * newton_parts(beyond, HSEP_NEWTON_APART * HSEP_NEWTON_VARIED) + of_physics +
+           NEWTON_BEHIND * newton_parts(beyond, HSEP_NEWTON_VARIANCE_STRIDE * HSEP_NEWTON_VARIED) + of_physics +
            self->n_steps * step + 2 * NEWTON_PREDICTION + NEWTON_PASS +
            NEWTON_SOME * newton_parts(window, HSEP_NEWTON_VARIED);
 }
 
-/* Predict more samples under a plan, up to one; the first ones with its commands. apart: as hsep_averaged_go_on's. */
+/* Predict more samples under a plan, up to one; the first ones with its commands. stride: as hsep_averaged_go_on's. */
 static void newton_predict(
-    hsep_newton *self, const hsep_newton_task *task, const hsep_real c[], hsep_int last, hsep_int apart)
+    hsep_newton *self, const hsep_newton_task *task, const hsep_real c[], hsep_int last, hsep_int stride)
 {
     hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     if (self->samples == 0) {
         newton_command(self, task, c, HSEP_N_DECIDED + self->n);
-        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, last, apart);
+        hsep_averaged_predict(task->model, hsep_at(self, self->command), x_pb, e_h, last, stride);
     } else {
-        hsep_averaged_go_on(task->model, x_pb, e_h, self->samples, last, apart);
+        hsep_averaged_go_on(task->model, x_pb, e_h, self->samples, last, stride);
     }
     self->samples = last;
 }
 
-/* Predict the next ones with variances, one for each sample in the window, and one for some behind it. */
+/* Predict the next ones with variances, one for each sample in the window, and one for some after it. */
 static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[])
 {
-    const hsep_int window = self->late + self->Np, apart = self->samples < window ? 1 : HSEP_NEWTON_APART;
-    const hsep_int end = apart == 1 ? window : self->late + self->preview;
-    newton_predict(self, task, c, hsep_min(self->samples + apart * HSEP_NEWTON_VARIED, end), apart);
+    const hsep_int window = self->late + self->Np, stride = self->samples < window ? 1 : HSEP_NEWTON_VARIANCE_STRIDE;
+    const hsep_int end = stride == 1 ? window : self->late + self->preview;
+    newton_predict(self, task, c, hsep_min(self->samples + stride * HSEP_NEWTON_VARIED, end), stride);
 }
 
 /* Cut a plan: what follows counts as so much, and is done when newton_go_on is called again; where: another one for
  * each. A switch into the midst of a function goes on there (protothreads, Dunkels et al. 2006). */
-#define NEWTON_MADE 99 /* place behind the last yield */
+#define NEWTON_MADE 99 /* place after the last yield */
 #define NEWTON_YIELD(where, count) \
     do { \
         self->place = (where); \

@@ -3,8 +3,8 @@
  * min |x_d - x_h(x_d + delta)|^2 + jerk_weight |D^3 delta|^2 within the drive's limits, where x_h is not affine in
  * delta. Each of one to three Gauss-Newton steps solves the quadratic programme of the model linearised at the best
  * plan so far, friction over what the step before changed, and goes to its minimum if that lowers the cost. Once it has
- * learned, the averaged model judges all plans: its own, the physics model's, and the remainder of the last one; the
- * best is taken, of its own change of the last one a share. Where compensation is off a plan ends it.
+ * learned, the averaged model judges all plans: its own, the physics model's, and the remainder of the last one. The
+ * best is taken; by its own plan only a share of the change is made. Where compensation is off a plan ends it.
  *
  * A plan is one function in reading order, cut by yields into short parts, each of which counts as a few; the longest
  * plan is counted, and hsep_newton_run does a sample's equal share of it.
@@ -78,7 +78,7 @@ typedef struct {
 
 HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_parameters *parameters);
 
-/* Fill the block, which is 0, with the planner that solves its plans, and a spline behind G_pb, (preview,), m/m. */
+/* Fill the block, which is 0, with the planner that solves its plans, and a spline after G_pb, (preview,), m/m. */
 HSEP_API void hsep_newton_init(
     hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 

@@ -23,7 +23,7 @@
 #define HSEP_LIMITS_MOVES 1e-12
 
 /* hybridsep/compensate/newton.py */
-#define HSEP_NEWTON_APART 4
+#define HSEP_NEWTON_VARIANCE_STRIDE 4
 #define HSEP_NEWTON_TOLERANCE 0.0001, 0.01, 1e-05, 5, 100.0
 #define HSEP_NEWTON_FIRST_REACH 0.1
 #define HSEP_NEWTON_LEAST_REACH 0.03

@@ -52,8 +52,8 @@ static inline hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing)
 static inline const hsep_real *hsep_splines_shape(const hsep_splines *self) { return hsep_at_const(self, self->shape); }
 
 /* Knots of the splines that a plan is solved for: sums of the uniform ones, which it changes the last plan by. In the
- * first two windows, in which a plan acts or is pinned next, these are uniform splines themselves; behind them knots
- * are twice, and behind four windows four times as far apart. What is planned there is planned again, with closer
+ * first two windows, in which a plan acts or is pinned next, these are uniform splines themselves; after them knots
+ * are twice, and after four windows four times as far apart. What is planned there is planned again, with closer
  * knots, before it acts, and goes on as it is until then. A spline is a sum of those with half its knot interval. */
 #define HSEP_KNOTS_LEVELS 3 /* of the distance between knots: 1, 2, 4 spacings */
 #define HSEP_KNOTS_NEAR 5   /* uniform splines on each side whose rows overlap those of one, at most */
@@ -123,11 +123,11 @@ static inline void hsep_splines_init(
     }
 }
 
-/* Sum of the first count splines, so many samples behind a knot, with coefficients c, (count,), from spline -3 on. */
-static inline hsep_real splines_behind(
-    const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int knot, hsep_int within)
+/* Sum of the first count splines at sample k, with coefficients c, (count,), from spline -3 on. */
+static inline hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int k)
 {
-    const hsep_real *b = hsep_splines_shape(self) + within;
+    const hsep_int knot = k / self->spacing;
+    const hsep_real *b = hsep_splines_shape(self) + k % self->spacing;
     hsep_real sum = 0.0;
     for (hsep_int i = 0; i <= HSEP_N_DECIDED && knot + i < count; i++) {
         sum += c[knot + i] * b[(HSEP_N_DECIDED - i) * self->spacing];
@@ -135,23 +135,24 @@ static inline hsep_real splines_behind(
     return sum;
 }
 
-/* Sum of the first count splines at sample k, with coefficients c, (count,), from spline -3 on. */
-static inline hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int k)
-{
-    return splines_behind(self, c, count, k / self->spacing, k % self->spacing);
-}
-
 /* Rows, (4 preview,), of a change by c, (count,): of spline first - 3, whose last part acts, and those after it. */
 static inline void hsep_splines_rows(
     const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int first, hsep_int preview, hsep_real rows[])
 {
-    hsep_real now[HSEP_ORDERS] = {0.0};
-    for (hsep_int k = 0, knot = 0, within = 0; k < preview; k++) { /* without a division */
-        hsep_differ(now, knot < first ? 0.0 : splines_behind(self, c, count, knot - first, within));
-        within = within + 1 < self->spacing ? within + 1 : 0;
-        knot += within == 0;
-        for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-            rows[order * preview + k] = now[order] * self->share[order];
+    const hsep_int spacing = self->spacing;
+    const hsep_real s0 = self->share[0], s1 = self->share[1], s2 = self->share[2], s3 = self->share[3];
+    hsep_real *r1 = rows + preview, *r2 = r1 + preview, *r3 = r2 + preview, last = 0.0, last_1 = 0.0, last_2 = 0.0;
+    for (hsep_int k = 0, knot = 0; k < preview; knot++) { /* four splines act from one knot to the next */
+        const hsep_real *b = hsep_splines_shape(self);
+        hsep_real a[HSEP_N_DECIDED + 1];
+        for (hsep_int i = 0; i <= HSEP_N_DECIDED; i++) {
+            a[i] = knot >= first && knot - first + i < count ? c[knot - first + i] : 0.0;
+        }
+        for (const hsep_int end = hsep_min(k + spacing, preview); k < end; k++, b++) {
+            const hsep_real d = ((a[0] * b[3 * spacing] + a[1] * b[2 * spacing]) + a[2] * b[spacing]) + a[3] * b[0];
+            const hsep_real d_1 = d - last, d_2 = d_1 - last_1;
+            rows[k] = d * s0, r1[k] = d_1 * s1, r2[k] = d_2 * s2, r3[k] = (d_2 - last_2) * s3;
+            last = d, last_1 = d_1, last_2 = d_2;
         }
     }
 }
@@ -211,19 +212,17 @@ static inline void splines_products(
     const hsep_int spacing = self->spacing;
     hsep_lanes s0 = {0.0}, s1 = s0, s2 = s0, s3 = s0; /* each has a name, and so a register */
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-        const hsep_real *e = splines_differences(self, order);
-        const hsep_int length = splines_length(self, order);
-        hsep_int begin = order * self->preview; /* of a phase */
+        const hsep_real *before = splines_differences(self, order), *e = before + d * spacing;
+        const hsep_real *of_phase = sorted + order * self->preview + i + d;
+        const hsep_int length = splines_length(self, order), count = length > d * spacing ? length - d * spacing : 0;
         for (hsep_int phase = 0; phase < spacing; phase++) {
-            const hsep_real *weight = sorted + begin + i;
-            for (hsep_int k = phase; k < length; k += spacing, weight++) {
-                if (k > d * spacing) {
-                    const hsep_real product = e[k] * e[k - d * spacing];
-                    const hsep_lanes *w = hsep_lanes_const(weight);
-                    s0 += product * w[0], s1 += product * w[1], s2 += product * w[2], s3 += product * w[3];
-                }
+            const hsep_real *weight = of_phase + (phase == 0); /* the first difference is 0 */
+            for (hsep_int k = phase == 0 ? spacing : phase; k < count; k += spacing, weight++) {
+                const hsep_real product = e[k] * before[k];
+                const hsep_lanes *w = hsep_lanes_const(weight);
+                s0 += product * w[0], s1 += product * w[1], s2 += product * w[2], s3 += product * w[3];
             }
-            begin += (self->preview - phase - 1) / spacing + 1;
+            of_phase += (self->preview - phase - 1) / spacing + 1;
         }
     }
     hsep_lanes *to = hsep_lanes_at(sums);
@@ -268,7 +267,7 @@ static inline hsep_real hsep_splines_energy(const hsep_splines *self)
     return sum;
 }
 
-/* The triangle of n rows := W' W of the splines behind a filter, W's columns being the filtered spline, (preview,),
+/* The triangle of n rows := W' W of the filtered splines, W's columns being the filtered spline, (preview,),
  * each shifted by one spacing more. Each diagonal is a running sum. */
 static inline void hsep_splines_filtered_gram(
     const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[])
@@ -311,7 +310,7 @@ static inline hsep_knot hsep_knots_at(const hsep_knots *self, hsep_int i)
         .share = knots_shares + knots_places[level]};
 }
 
-/* n uniform splines, of which so many begin in a window; 0: each is solved for. */
+/* n uniform splines, and how many of them begin in a window; 0: each is solved for. */
 static inline hsep_knots hsep_knots_of(hsep_int n, hsep_int window)
 {
     const hsep_int wide = window > 4 ? window : 4;

@@ -1,7 +1,7 @@
 /* Layout of a block of memory: a struct, then its arrays, each at an offset that the struct holds.
  *
  * Every struct with a function hsep_NAME_lay_out or hsep_NAME_size begins a block. A member whose comment has a shape
- * is the offset of that array, one that is called as another block the offset of that block, in words from the
+ * is the offset of that array, one that is named after a block the offset of that block, in words from the
  * beginning of the struct. One function walks them with a cursor, the end of what is taken so far: the offsets and the
  * size are the same walk. A block holds no pointers, so a copy of it is its state. Its struct has members of one size
  * only, which HSEP_ASSERT_WORDS proves: no byte of a state is padding.

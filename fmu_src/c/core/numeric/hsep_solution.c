@@ -186,33 +186,27 @@ static void solution_forward_abreast(hsep_solution *self)
 {
     const hsep_int m = self->n_head + self->n_tail;
     const hsep_real *row = hsep_at(self, self->factor);
-    hsep_lanes *x = hsep_lanes_at(hsep_at(self, self->abreast));
+    hsep_lanes *y = hsep_lanes_at(hsep_at(self, self->abreast));
     for (hsep_int first = 0; first < m; first += 4) {
         const hsep_int left = m - first, height = hsep_min(left, 4);
         const hsep_real *r[4] = {NULL};
-        hsep_lanes *y = x + HSEP_OF_FOUR * first;
-        for (hsep_int i = 0; i < height; i++) {
-            for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
-                y[HSEP_OF_FOUR * i + l] /= row[0];
-            }
+        hsep_lanes a[4], b[4]; /* two rows each */
+        for (hsep_int i = 0; i < height; i++, y += 2) {
+            a[i] = y[0] /= row[0];
+            b[i] = y[1] /= row[0];
             for (hsep_int j = 1; i + j < height; j++) {
-                for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
-                    y[HSEP_OF_FOUR * (i + j) + l] -= row[j] * y[HSEP_OF_FOUR * i + l];
-                }
+                y[2 * j] -= row[j] * a[i];
+                y[2 * j + 1] -= row[j] * b[i];
             }
             r[i] = row + (height - i);
-            row += m + 1 - (first + i);
+            row += left + 1 - i;
         }
-        if (left > 4) {
-            const hsep_real *r0 = r[0], *r1 = r[1], *r2 = r[2], *r3 = r[3];
-            for (hsep_int l = 0; l < HSEP_OF_FOUR; l++) {
-                const hsep_lanes *at = y + l, a0 = at[0], a1 = at[HSEP_OF_FOUR], a2 = at[2 * HSEP_OF_FOUR];
-                const hsep_lanes a3 = at[3 * HSEP_OF_FOUR];
-                hsep_lanes *to = y + l + 4 * HSEP_OF_FOUR;
-                for (hsep_int j = 0; j < left - 4; j++, to += HSEP_OF_FOUR) {
-                    *to = (((*to - r0[j] * a0) - r1[j] * a1) - r2[j] * a2) - r3[j] * a3;
-                }
-            }
+        const hsep_real *r0 = r[0], *r1 = r[1], *r2 = r[2], *r3 = r[3];
+        for (hsep_int j = 0; j + 4 < left; j++) { /* an entry of the factor is loaded once for all rows */
+            hsep_lanes *to = y + 2 * j, u = to[0] - r0[j] * a[0], v = to[1] - r0[j] * b[0];
+            u -= r1[j] * a[1], v -= r1[j] * b[1];
+            u -= r2[j] * a[2], v -= r2[j] * b[2];
+            to[0] = u - r3[j] * a[3], to[1] = v - r3[j] * b[3];
         }
     }
 }
@@ -221,15 +215,13 @@ static void solution_forward_abreast(hsep_solution *self)
 static void solution_leverages_abreast(hsep_solution *self, hsep_int count, hsep_real leverages[HSEP_SOLUTION_ABREAST])
 {
     const hsep_int m = self->n_head + self->n_tail;
-    const hsep_real *rows = hsep_at(self, self->work);
+    const hsep_real *r0 = hsep_at(self, self->work), *r1 = r0 + (m + 1); /* what is beyond the count is a copy */
+    const hsep_real *r2 = count > 2 ? r1 + (m + 1) : r1, *r3 = count > 3 ? r2 + (m + 1) : r2;
     hsep_real *to = hsep_at(self, self->abreast);
     const hsep_lanes *x = hsep_lanes_at(to);
     hsep_lanes sums[HSEP_OF_FOUR];
-    for (hsep_int c = 0; c < HSEP_SOLUTION_ABREAST; c++) { /* what is beyond is a copy */
-        const hsep_real *row = rows + (m + 1) * hsep_min(c, count - 1);
-        for (hsep_int i = 0; i < m; i++) {
-            to[HSEP_SOLUTION_ABREAST * i + c] = row[i];
-        }
+    for (hsep_int i = 0; i < m; i++, to += HSEP_SOLUTION_ABREAST) {
+        to[0] = r0[i], to[1] = r1[i], to[2] = r2[i], to[3] = r3[i];
     }
     solution_forward_abreast(self);
     for (hsep_int l = 0; l < HSEP_OF_FOUR; l++, x++) { /* as hsep_dot has each; a sum with a name has a register */

@@ -194,7 +194,7 @@ HSEP_API void hsep_predictor_begin(hsep_predictor *self)
     }
     self->n_published = 0;
     self->held = self->residual;
-    hsep_predictor_uncertainty(self)->least = averaged != NULL ? averaged->reach.farthest : 0.0;
+    hsep_predictor_uncertainty(self)->least = averaged != NULL ? averaged->gate.farthest : 0.0;
 }
 
 HSEP_API void hsep_predictor_publish(hsep_predictor *self, hsep_int last)

@@ -12,7 +12,7 @@
 typedef struct {
     hsep_int Np;
     hsep_real theta[HSEP_UNCERTAINTY_N_COMPONENTS];    /* variance of the noise, m2; others relative to their causes */
-    hsep_real evidence[HSEP_UNCERTAINTY_N_COMPONENTS]; /* effective number of windows behind each theta */
+    hsep_real evidence[HSEP_UNCERTAINTY_N_COMPONENTS]; /* effective number of windows of each theta */
     hsep_real factor;                                  /* c in the middle of a window */
     hsep_real ratio;                                   /* c at its end relative to that at its beginning */
     hsep_real recent; /* m2, recent mean square of the residual; 0 before the first window */

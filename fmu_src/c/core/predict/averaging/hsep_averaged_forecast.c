@@ -203,14 +203,14 @@ static void averaged_stack(hsep_averaged *self, hsep_real e[], hsep_int begin, h
 }
 
 HSEP_API void hsep_averaged_go_on(
-    hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], hsep_int first, hsep_int last, hsep_int apart)
+    hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], hsep_int first, hsep_int last, hsep_int stride)
 {
     const hsep_int begin = self->n - last, end = self->n - first;
     hsep_real *x = hsep_at(self, self->x), *rows = hsep_at(self, self->rows);
     hsep_command *command = hsep_averaged_command(self);
-    if (self->predicted[HSEP_STATIC]) { /* the rows hold stiffness and damping at x_pb */
+    if (self->predicted[HSEP_STATIC]) { /* the rows hold stiffness and damping at x_pb: so they vary */
         hsep_expert *at_first = hsep_averaged_expert(self, HSEP_STATIC);
-        hsep_expert_predict(at_first, rows, first, last, apart > 0);
+        hsep_expert_predict(at_first, rows, first, last, stride);
         for (hsep_int j = begin; j < end; j++) {
             x[j] = x_pb[j] + hsep_at(at_first, at_first->e_h)[j];
         }
@@ -223,7 +223,7 @@ HSEP_API void hsep_averaged_go_on(
         if (self->predicted[i]) {
             const int of_command = hsep_averaged_kind_of(self, i) == HSEP_COMMAND_RESIDUAL;
             const hsep_real *of_kind = of_command ? hsep_at(command, command->rows) : rows;
-            hsep_expert_predict(hsep_averaged_expert(self, i), of_kind, first, last, apart);
+            hsep_expert_predict(hsep_averaged_expert(self, i), of_kind, first, last, i == HSEP_STATIC ? 0 : stride);
             averaged_take(self, i, x_pb, begin, end);
         }
     }
@@ -268,9 +268,9 @@ HSEP_API void hsep_averaged_forecast(
 }
 
 HSEP_API void hsep_averaged_predict(
-    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last, hsep_int apart)
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last, hsep_int stride)
 {
     averaged_rows(self, x_d, x_pb);
     averaged_begin(self, e + self->n);
-    hsep_averaged_go_on(self, x_pb, e, 0, last, apart);
+    hsep_averaged_go_on(self, x_pb, e, 0, last, stride);
 }

@@ -44,7 +44,7 @@ static void averaged_begin_window(hsep_averaged *self, const hsep_real x_d[], co
     learned->fastest = hsep_fmax(learned->fastest, hsep_fmax(first, hsep_largest_step(x_pb, self->Np)));
     hsep_copy(hsep_at(self, self->largest), hsep_at(self, self->forecast_largest), self->n_static);
     const hsep_real fastest = hsep_fmax(learned->fastest, learned->velocity_scale * self->T_s);
-    hsep_gate_begin(&self->reach, learned->scales[HSEP_MODEL_RESIDUAL].largest, fastest);
+    hsep_gate_begin(&self->gate, learned->scales[HSEP_MODEL_RESIDUAL].largest, fastest);
     hsep_command_take(command, x_d, self->Np);
     if (self->n > self->Np) { /* what was tried last went beyond the window */
         const hsep_real *late = hsep_command_late(command, self->Np);
@@ -84,8 +84,8 @@ static void averaged_fold(hsep_averaged *self, hsep_int kind, hsep_int k, const 
     }
     hsep_copy(to + p, rows + k * n_static, n_static);
     to[gram->n] = lags[-1];
-    /* After early samples the next solutions may have begun. */
-    for (hsep_int i = HSEP_REGRESSIONS; k >= self->early && i < HSEP_REGRESSIONS_END; i++) {
+    /* After solving_from samples the next solutions may have begun. */
+    for (hsep_int i = HSEP_REGRESSIONS; k >= self->solving_from && i < HSEP_REGRESSIONS_END; i++) {
         hsep_solution *solution = hsep_averaged_solution(self, i);
         if (hsep_averaged_kind_of(self, i) == kind && solution != NULL && solution->begun) {
             hsep_solution_row(solution, to, gram->n);
@@ -192,7 +192,7 @@ static void averaged_follow_sample(hsep_averaged *self, const hsep_real x_pb[], 
 {
     const hsep_int k = self->followed++, j = self->Np - 1 - k;
     const hsep_real measured = hsep_at(self, self->measured)[j] - x_pb[j];
-    const int accepted = hsep_gate_judge(&self->reach, measured, self->T_s);
+    const int accepted = hsep_gate_judge(&self->gate, measured, self->T_s);
     hsep_at(self, self->accepted)[j] = accepted ? 1.0 : 0.0;
     if (accepted) {
         e[j] = measured;
@@ -205,7 +205,7 @@ static void averaged_follow_sample(hsep_averaged *self, const hsep_real x_pb[], 
         averaged_fold(self, HSEP_MODEL_RESIDUAL, k, hsep_at(self, self->rows), e);
         averaged_fold(self, HSEP_COMMAND_RESIDUAL, k, hsep_at_const(command, command->rows), hsep_at(self, self->e_0));
     }
-    if (fold && self->followed == self->early) {
+    if (fold && self->followed == self->solving_from) {
         averaged_prepare(self, e);
     }
 }
@@ -216,7 +216,7 @@ HSEP_API void hsep_averaged_follow(
     if (self->followed == 0 && last > 0) {
         averaged_begin_window(self, x_d, x_pb, 1);
     }
-    const int begun = self->followed >= self->early;
+    const int begun = self->followed >= self->solving_from;
     for (hsep_int i = 0; i < HSEP_AVERAGED_PACE && self->followed < last; i++) {
         averaged_follow_sample(self, x_pb, e, 1);
     }

@@ -38,7 +38,7 @@ HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_predict
     self->p = settings->p;
     self->n_static = hsep_disturbances_n(parameters);
     self->late = hsep_late(settings);
-    self->early = self->Np - hsep_expert_ahead(self->Np);
+    self->solving_from = self->Np - hsep_expert_ahead(self->Np);
     self->T_s = settings->T_s;
     self->least_variance = settings->lambda;
     self->effect = averaging->effect;
@@ -141,7 +141,7 @@ HSEP_API void hsep_averaged_restart(hsep_averaged *self)
     self->leading = hsep_stack_leader(&learned->stacks[HSEP_OF_PREDICTIONS]);
     hsep_expert_init(hsep_averaged_expert(self, HSEP_FRESH_START), averaged_shape(self, HSEP_FRESH_START));
     *doubting = (hsep_expert_errors){0.0, 1.0};
-    self->reach = (hsep_gate){0};
+    self->gate = (hsep_gate){0};
     self->followed = self->known = 0;
     for (hsep_int i = 0; i < HSEP_N_STACKS; i++) {
         hsep_stack_forget(&learned->stacks[i], HSEP_FRESH_START);

@@ -41,14 +41,14 @@ typedef struct {
 typedef struct {
     hsep_int Np, n, p, n_static; /* samples of a window and of a prediction, lags, features without lags */
     hsep_int late;               /* samples by which the measurement is late */
-    hsep_int early;              /* samples of a window after which the next one's solutions may begin */
+    hsep_int solving_from;       /* samples of a window after which the next one's solutions may begin */
     hsep_real T_s;               /* s */
     hsep_real least_variance;    /* m2, of the noise */
     hsep_real effect;            /* m, prior standard deviation of a feature's effect; 0: from the residuals */
     hsep_real given_variance;    /* m2, of the noise; 0: estimated */
     hsep_real forgetting_factor; /* weight of earlier rows, from window to window */
     hsep_int leading;            /* expert that led when earlier runs ended, HSEP_ARX_RESIDUAL or HSEP_ARX_COMMAND */
-    hsep_gate reach;
+    hsep_gate gate;
     hsep_int n_rejected;  /* samples of this run that were not accepted */
     hsep_int is_levelled; /* whether its first window is learned, */
     hsep_real level;      /* m, and the mean residual in it, if the command moved by little beside it, else 0 */
@@ -152,13 +152,13 @@ HSEP_API void hsep_averaged_forecast(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], const hsep_real path[], hsep_int n_path,
     hsep_real e[], hsep_int last);
 
-/* Predict samples first ... last - 1, too, where the last call ended; apart: as hsep_expert_predict's. */
+/* Predict samples first ... last - 1, too, where the last call ended; stride: as hsep_expert_predict's. */
 HSEP_API void hsep_averaged_go_on(
-    hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], hsep_int first, hsep_int last, hsep_int apart);
+    hsep_averaged *self, const hsep_real x_pb[], hsep_real e[], hsep_int first, hsep_int last, hsep_int stride);
 
 /* Predict samples 0 ... last - 1 of other commands with the same scales and weights; hsep_averaged_go_on does more. */
 HSEP_API void hsep_averaged_predict(
-    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last, hsep_int apart);
+    hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last, hsep_int stride);
 
 /* Weigh the experts as the stack of predictions does, as a forecast begins, or as that of plans; e, (n + p,), m: the
  * samples 0 ... last - 1 that were predicted are stacked anew. Cost: 36 last multiply-adds. */
@@ -174,8 +174,8 @@ HSEP_API void hsep_averaged_begin_in_motion(hsep_averaged *self, const hsep_real
 /* Follow that window as it is measured: judge and learn its samples up to last - 1, HSEP_AVERAGED_PACE of them in a
  * call. All of the window must have been predicted. x_d: its commands, (Np,), m; e: (Np + p,), m, becomes its
  * residuals; where a measurement is not believed, the predicted one, shifted as the believed ones beside it are off;
- * after it the earlier ones. A sample costs a hsep_gram_fold for each residual, and after early samples a share of the
- * next window's solutions. */
+ * after it the earlier ones. A sample costs a hsep_gram_fold for each residual, and after solving_from samples a share
+ * of the next window's solutions. */
 HSEP_API void hsep_averaged_follow(
     hsep_averaged *self, const hsep_real x_d[], const hsep_real x_pb[], hsep_real e[], hsep_int last);
 

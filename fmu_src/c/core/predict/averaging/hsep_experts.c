@@ -115,15 +115,15 @@ static void expert_respond(hsep_expert *self, hsep_int first, hsep_int last)
     }
 }
 
-/* Variances of rows of samples k ... last - 1, of the first of every apart, at most HSEP_SOLUTION_ABREAST of them. */
-static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_int k, hsep_int last, hsep_int apart)
+/* Variances of rows of samples k ... last - 1, of the first of every stride, at most HSEP_SOLUTION_ABREAST of them. */
+static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_int k, hsep_int last, hsep_int stride)
 {
     const hsep_int n_static = self->n_static, p = self->p;
-    const hsep_int count = hsep_min((last - k + apart - 1) / apart, HSEP_SOLUTION_ABREAST);
+    const hsep_int count = hsep_min((last - k + stride - 1) / stride, HSEP_SOLUTION_ABREAST);
     hsep_solution *solution = hsep_expert_solution(self);
     hsep_real *to = hsep_at(solution, solution->work), leverages[HSEP_SOLUTION_ABREAST];
     for (hsep_int c = 0; c < count; c++, to += p + n_static + 1) {
-        const hsep_int sample = k + apart * c;
+        const hsep_int sample = k + stride * c;
         const hsep_real *lags = hsep_at(self, self->unshrunk) + (self->n - sample);
         for (hsep_int i = 0; i < p; i++) {
             to[p - 1 - i] = lags[i];
@@ -131,13 +131,13 @@ static void expert_vary_rows(hsep_expert *self, const hsep_real rows[], hsep_int
         hsep_copy(to + p, rows + sample * n_static, n_static);
     }
     hsep_solution_leverages(solution, count, leverages);
-    for (hsep_int c = 0; c < apart * count && k + c < last; c++) {
-        hsep_at(self, self->variances)[self->n - 1 - k - c] = self->variance * leverages[c / apart];
+    for (hsep_int c = 0; c < stride * count && k + c < last; c++) {
+        hsep_at(self, self->variances)[self->n - 1 - k - c] = self->variance * leverages[c / stride];
     }
 }
 
 /* Variances of samples, the rows' carried through the impulse response, and what they leave of a prediction. */
-static void expert_vary(hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int apart)
+static void expert_vary(hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int stride)
 {
     const hsep_real most = HSEP_EXPERTS_DIVERGED * self->bound * self->bound;
     const hsep_real *run = hsep_at(self, self->run), *squares = hsep_at(self, self->squares);
@@ -145,8 +145,8 @@ static void expert_vary(hsep_expert *self, const hsep_real rows[], hsep_int firs
     if (self->p > 0) {
         expert_respond(self, first, last);
     }
-    for (hsep_int k = first; k < last; k += apart * HSEP_SOLUTION_ABREAST) {
-        expert_vary_rows(self, rows, k, last, apart);
+    for (hsep_int k = first; k < last; k += stride * HSEP_SOLUTION_ABREAST) {
+        expert_vary_rows(self, rows, k, last, stride);
     }
     for (hsep_int k = first; k < last; k++) {
         const hsep_int j = self->n - 1 - k;
@@ -166,11 +166,11 @@ HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_
 }
 
 HSEP_API void hsep_expert_predict(
-    hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int apart)
+    hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int stride)
 {
     expert_free_run(self, rows, first, last);
-    if (apart > 0) {
-        expert_vary(self, rows, first, last, apart);
+    if (stride > 0) {
+        expert_vary(self, rows, first, last, stride);
     }
     const hsep_real *unshrunk = hsep_at(self, self->unshrunk), *shrinkage = hsep_at(self, self->shrinkage);
     for (hsep_int j = self->n - last; j < self->n - first; j++) {

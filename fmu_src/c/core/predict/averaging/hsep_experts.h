@@ -80,11 +80,11 @@ HSEP_API void hsep_expert_solve(hsep_expert *self, hsep_real n_rows, const hsep_
 HSEP_API void hsep_expert_begin(hsep_expert *self, const hsep_real past[], hsep_real largest_square, hsep_real bound);
 
 /* Predict samples first ... last - 1 in free run, and shrink them by their variances; first is 0, or where the last
- * call ended. rows: (n, n_static), sample after sample. The row of the first of every apart samples, from first on,
- * counts for their variances; apart = 0: shrinking stays as in the last prediction. A sample costs n_static + p and,
+ * call ended. rows: (n, n_static), sample after sample. The row of the first of every stride samples, from first on,
+ * counts for their variances; stride = 0: shrinking stays as in the last prediction. A sample costs n_static + p and,
  * for its variance, last multiply-adds, and each row that counts a quarter of hsep_solution_leverages. */
 HSEP_API void hsep_expert_predict(
-    hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int apart);
+    hsep_expert *self, const hsep_real rows[], hsep_int first, hsep_int last, hsep_int stride);
 
 /* Estimate noise and correlation from the errors of the first n samples of a window. measured: (Np,) m; accepted:
  * (Np,), 1 where it counts, which one of them does at least; given: m2, known variance of the noise, else 0. */

@@ -243,8 +243,8 @@ HSEP_API hsep_real hsep_command_lay_out(hsep_command *self, const hsep_predictor
     const hsep_int n = hsep_predicted(parameters), late = parameters->settings.dead_time, half = late / 2;
     hsep_real end = HSEP_WORDS(hsep_command);
     self->n = n;
-    const hsep_int early = half > HSEP_AVERAGING_EARLY ? half : HSEP_AVERAGING_EARLY;
-    self->dead_time = late > early ? late - early : 0;
+    const hsep_int margin = half > HSEP_AVERAGING_DEAD_TIME_MARGIN ? half : HSEP_AVERAGING_DEAD_TIME_MARGIN;
+    self->dead_time = late > margin ? late - margin : 0;
     self->n_before = self->dead_time + HSEP_AVERAGING_LAGS_OF_COMMAND + 1;
     self->commands = hsep_take(&end, (hsep_real)n + (hsep_real)self->n_before);
     self->rows = hsep_take(&end, (hsep_real)n * HSEP_COMMAND_FEATURES);

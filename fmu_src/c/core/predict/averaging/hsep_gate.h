@@ -1,5 +1,5 @@
-/* Reach: a measurement is believed, unless the axis cannot have got there; as predict/averaging/gate.py, which says
- * when. Plain data; reentrant; allocates nothing. */
+/* Innovation gate: a measurement is believed, unless the axis cannot have got there; as predict/averaging/gate.py,
+ * which says when. Plain data; reentrant; allocates nothing. */
 #ifndef HSEP_GATE_H
 #define HSEP_GATE_H
 

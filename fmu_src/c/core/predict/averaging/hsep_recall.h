@@ -1,4 +1,4 @@
-/* Memory of a run for recall: what the physics model missed the last time that the machine was told the same; as
+/* Memory of a run for recall: what the physics model missed the last time that it got the same commands; as
  * predict/averaging/recall.py, which says how stretches are compared.
  *
  * Commands come one by one, and all lags are compared in the samples of a stride: even work. Rings, newest first.

@@ -1,4 +1,4 @@
-"""Choice of the settings that online model averaging leaves open: the numbers of lags; a hint at a period.
+"""Numbers of lags of a fit, the settings that online model averaging leaves open; and a hint at a period.
 
 Windows of all that is tried are equally long: a shorter one is always predicted better, by holding the last residual
 best of all, so ``Np`` is the controller's look-ahead and is never chosen.
