@@ -1,5 +1,6 @@
 """``fit``, from the log of an axis to its model, FMUs and a report."""
 
+import gc
 import math
 import shlex
 import sys
@@ -72,6 +73,7 @@ def fit(
     from ..logs.log import read_log
     from ..machines.machine import checked_name, machine_name
     from .console import check_outputs, print_channels, written_before
+    from .logs import different_logs, show
 
     if list_channels:
         print_channels(logs, as_json=as_json)
@@ -83,20 +85,19 @@ def fit(
     lags = [PARAMETERS["p"].checked(one, "--p") for one in numbers]
     ahead = _parsed(look_ahead, _seconds, "--look-ahead must be a time with its unit, such as 60ms or 0.06s")
     gains = _parsed(cascade, _gains, "--cascade must be NAME=VALUE with commas, each a number")
-    found = [read_log(path, **reading.arguments()) for path in logs]
+    used = different_logs([read_log(path, **reading.arguments()) for path in logs])
     # What computes takes seconds to import: a log that cannot be read is said before
     from ..fitting.build import fit_files
     from ..fitting.fit import fit as fit_logs
     from ..fitting.limits import drive_limits
     from ..logs.checks import findings_table
     from .console import console, print_json, progress_bar
-    from .logs import different_logs, show
 
+    gc.freeze()  # what is imported stays: to look through it again and again takes a twentieth of the time
     folder = out or Path(machine)
     files = fit_files(folder, machine, compensator=bool(drive_limits(known)))
     outputs = [("--out", path, ()) for path in files.values()]
     check_outputs(outputs, inputs, force=force, ours=written_before(files["results"], logs))
-    used = different_logs(found)
     for log in used:
         show((f"{log.path.name}: {remark}" for remark in log.remarks), ())
     with progress_bar(as_json) as advance:

@@ -88,6 +88,11 @@ def first_differences(signal: Array, before: Array | float = 0.0) -> Array:
     return found
 
 
+def mean(signal: Array) -> float:
+    """Return the mean of ``(n,)``, n ≥ 1, as ``np.mean`` does in three times the time."""
+    return float(np.add.reduce(signal)) / len(signal)
+
+
 def check_same_index(**columns: Any) -> None:
     """Raise SignalError if columns have indexes that differ; samples without an index are by their place."""
     indexes = {name: getattr(one, "index", None) for name, one in columns.items()}

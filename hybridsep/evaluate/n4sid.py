@@ -102,8 +102,13 @@ def _of_orders(R: Array, n_rows: int) -> list[StateSpace]:
 
 
 def _misfit(model: StateSpace, records: Sequence[tuple[Array, Array]], Np: int) -> float:
+    total = 0.0
     with np.errstate(all="ignore"):
-        states = [(u, y, model.states(u, y)) for u, y in records]
-        windows = [(slice(k, k + Np), *one) for one in states for k in range(_LAGS, len(one[1]), Np)]  # known by then
-        total = sum(float(np.nansum((y[at] - model.free_run(z[at.start], u[at])) ** 2)) for at, u, y, z in windows)
+        for u, y in records:
+            begins = np.arange(_LAGS, len(y), Np)  # the states are known by then
+            z, driven, direct = model.states(u, y)[begins], u @ model.B.T, u @ model.D
+            for at in (begins[begins + k < len(y)] + k for k in range(Np)):  # all windows side by side
+                z = z[: len(at)]
+                total += float(np.nansum((y[at] - z @ model.C - direct[at]) ** 2))
+                z = z @ model.A.T + driven[at]
     return total if np.isfinite(total) else np.inf

@@ -41,7 +41,7 @@ class FirstOrderLag:
 
 def fitted_lag(recordings: Sequence[tuple[Array, Array]]) -> FirstOrderLag:
     """Return the lag that fits commanded and measured positions ``(n,)``, m, NaN where missing, best."""
-    known = [(x_d, x, there) for x_d, x in recordings if (there := ~np.isnan(x)).any()]
+    known = [(x_d, x, slice(None) if there.all() else there) for x_d, x in recordings if (there := ~np.isnan(x)).any()]
 
     def misfit(log_tau: float, late: int) -> float:
         lag = FirstOrderLag(math.exp(log_tau), late)

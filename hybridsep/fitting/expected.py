@@ -105,8 +105,9 @@ class Trial:
                     ahead = FmuController(in_fmu, {**known.to_fmi(), **own.settings.to_fmi()})
                     stack.enter_context(ahead)
                 ahead.initialise(start)
+                x_dm_now = ahead.fmu.reader(["x_dm"]) if isinstance(ahead, FmuController) else None
                 for k, (x_d_ahead, r) in enumerate(zip(command.tolist(), residual.tolist(), strict=True)):
-                    x_dm[k] = sent = ahead.outputs()[0][0]
+                    x_dm[k] = sent = (x_dm_now() if x_dm_now else ahead.outputs()[0])[0]
                     true[k] = x_meas = drive(sent - start) + start + r
                     on_the_way.append(x_meas)
                     ahead.step(k, x_d_ahead, on_the_way.popleft())

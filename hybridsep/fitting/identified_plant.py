@@ -8,6 +8,7 @@ optimistic: the compensator has features for just these disturbances.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,6 +89,7 @@ class _Piece:
         self.u, self.x = x_d - x_d[:1], x - x_d[:1]
         self.v_d = np.diff(self.u, prepend=0.0) / discrete.T_s
         self.path = discrete.forced_response(discrete.rest(), self.u)[0]
+        self.friction = lru_cache(2)(lambda v_friction: np.tanh(self.v_d / v_friction))  # most steps leave it as it is
         n, n_train = np.arange(len(x_d)), recording.n_train
         # The model has forgotten then how it began, but for 1 % of its motion
         slowest = float(np.abs(np.linalg.eigvals(discrete.A)).max(initial=0.0))
@@ -106,7 +108,7 @@ def _errors(settings: PredictorSettings, plant: _Disturbed, pieces: Sequence[_Pi
         numerators, denominator = polynomials(theta, settings.T_s, settings.input_hold)
         of_modes.append((weights @ numerators, denominator))
     for one in pieces:
-        disturbance = plant.f * np.tanh(one.v_d / plant.v_friction) + plant.kappa * one.path * np.abs(one.path)
+        disturbance = plant.f * one.friction(plant.v_friction) + plant.kappa * one.path * np.abs(one.path)
         u = delayed(one.u - disturbance, plant.model.dead_time)
         found.append(np.asarray(one.x - sum(lfilter(*of_mode, u) for of_mode in of_modes)))
     return found

@@ -92,7 +92,7 @@ def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, ra
     if structure.n_modes == 0:
         return [np.log([rate])] if structure.lag else [np.empty(0)]
     if structure.n_modes == 1 and not structure.lag:
-        return [np.log([factor * rate, zeta]) for factor, zeta in ((1.0, 0.5), (2.0, 0.9), (4.0, 0.3))]
+        return [np.log([factor * rate, zeta]) for factor, zeta in ((1.0, 0.5), (2.0, 0.9))]
     n_modes = structure.n_modes - (not structure.lag)
     bases = [fit for other, fit in known.items() if other.n_modes == n_modes and not (other.lag and structure.lag)]
     if not bases:
@@ -102,12 +102,11 @@ def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, ra
     added = np.exp(np.linspace(np.log(rate), np.log(fastest), 6)[1:]) if fastest > rate else [fastest]
     if structure.lag:
         lags = [np.append(base, np.log(factor * rate)) for factor in (0.5, 3.0)]
-        if n_modes == 1:
-            slow = np.log([0.03 * rate, 0.7, 3.0 * rate])  # integrators beside a fast loop, or a feed-forward
-            return [*lags, slow]
+        if n_modes == 1:  # a slow part of integrators beside a fast loop, or of a feed-forward
+            return [lags[0], np.log([0.03 * rate, 0.7, 3.0 * rate])]
         # Two modes may have been found in the place of one and a lag: then the flexible mode is added to these
         one = min((fit for other, fit in known.items() if other.n_modes == 1 and other.lag), key=lambda fit: fit.rms)
-        return [*lags, *(np.concatenate((np.log([omega, 0.1]), one.theta)) for omega in (0.5 * rate, *added[:3]))]
+        return [*lags, np.concatenate((np.log([added[0], 0.1]), one.theta))]
     return [np.concatenate((base, np.log([omega, 0.1]))) for omega in added]
 
 

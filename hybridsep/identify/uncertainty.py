@@ -6,7 +6,7 @@ time is a whole number of samples: the deviations of the other parameters hold f
 deviation with all parameters free.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,7 +96,9 @@ def _named(fit: Fit, covariance: Array, T_s: float, unit: str) -> tuple[Estimate
     for i in range(fit.structure.n_modes):
         names += [(f"mode[{i + 1}].{name}", unit_of) for name, unit_of in units.items()]
     names += [("lag.tau", "s"), ("lag.gain", "1")] * fit.structure.lag
-    slopes = _differences(values, point) if point.size else np.zeros((len(values(point)), 0))
+    steps = np.diag(_STEP * np.maximum(np.abs(point), 1.0))  # of central differences
+    changes = ((values(point + step) - values(point - step)) / (2 * step.sum()) for step in steps)
+    slopes = np.column_stack((np.zeros((len(names), 0)), *changes))
     inner = covariance[: n_theta + n_linear, : n_theta + n_linear]
     deviations = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, inner, slopes), 0.0))
     found = [
@@ -107,9 +109,3 @@ def _named(fit: Fit, covariance: Array, T_s: float, unit: str) -> tuple[Estimate
     found.append(Estimate("dead_time", float(fit.delay.samples), float(delay), "samples"))
     found.append(Estimate("offset", fit.offset, float(offset), unit))
     return tuple(found)
-
-
-def _differences(f: Callable[[Array], Array], point: Array) -> Array:
-    """Return the Jacobian by central differences, ``(n_values, n_parameters)``."""
-    steps = _STEP * np.maximum(np.abs(point), 1.0)
-    return np.column_stack([(f(point + step) - f(point - step)) / (2 * step.sum()) for step in np.diag(steps)])

@@ -126,10 +126,6 @@ def line_entry(default: Any = MISSING) -> Any:
     return _text_entry(_is_line, _LINE_WORDS, default)
 
 
-def _are_lines(value: Any) -> bool:
-    return isinstance(value, list | tuple) and bool(value) and all(map(_is_line, value))
-
-
 def choice_entry(*choices: str, default: Any = MISSING) -> Any:
     """Declare an entry that is one of some words."""
     return _text_entry(lambda value: value in choices, " or ".join(choices), default, choices=choices)
@@ -336,7 +332,10 @@ class FileSection(Section):
         "a letter, then at most 99 letters, digits and _",
     )
     title: str = line_entry()
-    sources: tuple[str, ...] = _text_entry(_are_lines, f"a list, each entry {_LINE_WORDS}", ())
+    sources: tuple[str, ...] = _text_entry(
+        lambda value: isinstance(value, list | tuple) and bool(value) and all(map(_is_line, value)),
+        *(f"a list, each entry {_LINE_WORDS}", ()),
+    )
     T_s: float = parameter_entry("T_s", PARAMETERS["T_s"].default)
     unit: str = choice_entry("m", "rad", default="m")
     physics: Physics = section_entry(Physics)

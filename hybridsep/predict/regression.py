@@ -96,9 +96,9 @@ class RidgeRegression:
         column = self.factor[:, -1]
         return float(column @ column)
 
-    def update(self, rows: Array, target: Array) -> RidgeRegression:
-        """Return the regression with a block of rows φ, ``(m, n)``, and their targets, ``(m,)``, more."""
-        return RidgeRegression(_folded(self.factor, np.column_stack((rows, target))), self.n_rows + len(target))
+    def update(self, *columns: Array) -> RidgeRegression:
+        """Return the regression with a block of rows φ, one or more ``(m, …)``, and their targets, ``(m,)``, more."""
+        return RidgeRegression(_folded(self.factor, np.column_stack(columns)), self.n_rows + len(columns[-1]))
 
     def add(self, other: RidgeRegression) -> RidgeRegression:
         """Return the regression with all rows of another one of the same features, its penalty with them."""

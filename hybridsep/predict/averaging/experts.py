@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ...base.signals import Array, first_differences
+from ...base.signals import Array, first_differences, mean
 from ..regression import PenalisedSolution, RidgeRegression, lags
 from ..window import FeatureScales, ResidualWindow
 from .constants import CONSTANTS
@@ -52,7 +52,7 @@ class ResidualScale:
 
     def follow(self, residuals: Array, level: float) -> ResidualScale:
         """Return the scale with another window of residuals, ``(n,)``, m, n ≥ 1; ``level``, m: of their run."""
-        mean_square, move = float(np.mean(residuals**2)), float(np.mean((residuals - level) ** 2))
+        mean_square, move = mean(residuals**2), mean((residuals - level) ** 2)
         largest = max(self.largest, float(np.abs(residuals).max()))
         return ResidualScale(max(self.largest_square, mean_square), max(self.largest_move, move), largest)
 
@@ -99,7 +99,7 @@ class ExpertErrors:
         noise_variance, correlation = given or prediction.noise_variance, self.correlation
         if noise_variance > 0.0:
             error = (measured - prediction.unshrunk[: len(measured)])[accepted]
-            seen = min(len(error) * float(np.mean(error)) ** 2 / noise_variance, _DIVERGED)
+            seen = min(len(error) * mean(error) ** 2 / noise_variance, _DIVERGED)
             correlation += CONSTANTS.correlation_rate * (seen - correlation)
             correlation = min(max(correlation, 1.0), CONSTANTS.correlation_max)
         return ExpertErrors(noise_variance, correlation)
@@ -183,12 +183,10 @@ def solve(evidence: RidgeRegression, variance: float, scales: Array, p: int) -> 
 def _recursion(w_e: Array, drive: Array, past: Array) -> tuple[Array, Array]:
     """Return the free run ``e(k) = drive(k) + Σ_i w_e,i e(k−i)``, and the recursion's impulse response; eq. (4)."""
     denominator = np.concatenate(([1.0], -w_e))
-    state = np.correlate(w_e, past, "full")[len(past) - 1 :]
-    impulse = np.zeros(len(drive))
-    impulse[0] = 1.0
+    state, both = np.zeros((2, len(w_e))), np.zeros((2, len(drive)))
+    state[0], both[0], both[1, 0] = np.correlate(w_e, past, "full")[len(past) - 1 :], drive, 1.0
     with np.errstate(all="ignore"):  # an unstable recursion is recognised by what it gives
-        e, _ = lfilter([1.0], denominator, drive, zi=state)
-        response = lfilter([1.0], denominator, impulse)
+        (e, response), _ = lfilter([1.0], denominator, both, zi=state)
     if not np.abs(response).max() <= _DIVERGED:  # NaN too
         response = np.clip(np.nan_to_num(response, nan=_DIVERGED), -_DIVERGED, _DIVERGED)
     return e, response

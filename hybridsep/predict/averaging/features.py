@@ -15,6 +15,7 @@ are a constant and the increments ``x_d(k−d−j) − x_d(k−d−j−1)``, ``j
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
@@ -50,7 +51,7 @@ class CommandFeatures:
         """Commands before a window that its features need."""
         return self.dead_time + self.p + 1
 
-    @property
+    @cached_property
     def shares(self) -> Array:
         """Effects that features may have, ``(p + 2,)``, relative to the largest: an old increment explains less."""
         return np.concatenate(([1.0], np.sqrt(CONSTANTS.last_lag ** (np.arange(self.p + 1) / self.p))))
@@ -133,32 +134,32 @@ class StaticFeatures:
     # position's own velocity is damped then, as ``x_pb`` turns with every change of the command, else that of ``x_pb``
     n_known: int | None = None
 
-    @property
+    @cached_property
     def n_differences(self) -> int:
         """Differences of ``x_pb`` among the features."""
         return min(self.q, _DIFFERENCES)
 
-    @property
+    @cached_property
     def n_disturbances(self) -> int:
         """Number of disturbances."""
         return N_LASTING + (_N_PERIODIC if self.period > 0.0 else 0) + len(self.own)
 
-    @property
+    @cached_property
     def n_linear(self) -> int:
         """Number of features before the disturbances: 1, ``x_pb``, its differences, changes of the command."""
         return 2 + self.n_differences + N_SPANS
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of features."""
         return self.n_linear + 2 * self.n_disturbances
 
-    @property
+    @cached_property
     def command(self) -> CommandFeatures:
         """Features of the command."""
         return CommandFeatures.of(self.discrete.dead_time)
 
-    @property
+    @cached_property
     def shares(self) -> Array:
         """Effects that features may have, ``(n,)``, relative to the largest."""
         shares = np.ones(self.n)

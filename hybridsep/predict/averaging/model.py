@@ -383,9 +383,9 @@ def _folded(
     of_kind = taken(MODEL_RESIDUAL), taken(COMMAND_RESIDUAL)
 
     def learned(evidence: Iterable[WarmStartRows], part: slice) -> tuple[WarmStartRows, WarmStartRows]:
+        kept = slice(None) if accepted[part].all() else accepted[part]
         of_physics, of_command = (
-            one.learn(*(signal[part][accepted[part]] for signal in row))
-            for one, row in zip(evidence, of_kind, strict=True)
+            one.learn(*(signal[part][kept] for signal in row)) for one, row in zip(evidence, of_kind, strict=True)
         )
         return of_physics, of_command
 
@@ -444,7 +444,7 @@ def _judged(
         learned = replace(learned, stacks=(stack, of_both))
     stack, led, fresh = learned.stack, state.leading.place, FRESH_START.place
     largest, (total, rows) = learned.scales[MODEL_RESIDUAL].largest_square, stack.evidence
-    squares = np.diag(stack.gram) - 2.0 * stack.cross + total  # of the errors so far
+    squares = stack.gram.diagonal() - 2.0 * stack.cross + total  # of the errors so far
     # Both began the run with the same evidence, so what they differ by has come in it
     harm, seen = squares[led] - squares[fresh], state.evidence[MODEL_RESIDUAL].this.target_square
     errs = squares[led] > CONSTANTS.discard_error * largest * rows

@@ -50,7 +50,7 @@ class Stack:
         gram = gamma * self.gram + predicted @ predicted.T
         cross = gamma * self.cross + predicted @ measured
         total, rows = evidence = gamma * self.evidence + np.array([measured @ measured, n])
-        least_sum = float(np.min(total - 2.0 * cross + np.diag(gram), initial=total))
+        least_sum = float(np.min(total - 2.0 * cross + gram.diagonal(), initial=total))
         ridge = kappa * max(least_sum / rows, least, _LEAST_SQUARE) * n
         hessian, linear = gram + ridge * np.eye(len(EXPERTS)), cross + ridge * prior
         weights = simplex_minimum(hessian, linear, self.weights > 0.0)

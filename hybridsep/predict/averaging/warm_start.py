@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ...base.signals import Array
 from ..regression import RidgeRegression
 
@@ -66,4 +64,4 @@ class WarmStartRows:
         """Learn rows of features ``(m, n_static)``, lags ``(m, p)`` and targets ``(m,)``."""
         if not len(target):
             return self
-        return replace(self, this=self.this.update(np.column_stack((rows, lagged)), target))
+        return replace(self, this=self.this.update(rows, lagged, target))
