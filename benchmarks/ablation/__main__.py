@@ -98,11 +98,7 @@ VARIANTS: Mapping[str, Changes] = {
     },
     "features never begin anew": constants(velocity_jump=1e300),
     "rows are independent": constants(correlation_max=1.0),
-    "no recall": {
-        AVERAGING + "hsep_recall.h": [
-            ("    if (self->size <= self->n) {", "    if (self->size <= self->n + self->size) {")
-        ]
-    },
+    "no recall": {AVERAGING + "hsep_recall.h": [("    if (self->size < n +", "    if (self->size < self->size + n +")]},
     "no first differences of disturbances": constants(difference_share=1e-6),
     "first differences as large": constants(difference_share=1.0),
     "last lag as the first": constants(last_lag=1.0),

@@ -26,7 +26,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..base.signals import Array, first_differences
-from ..predict.averaging.experts import COMMAND_RESIDUAL, STATIC, SolvedExpert
+from ..predict.averaging.experts import ARX_COMMAND, COMMAND_RESIDUAL, RECALL, STATIC, SolvedExpert
 from ..predict.averaging.features import N_FRICTION, N_LASTING, N_SPANS, N_STOPS, StaticFeatures, StaticState
 from ..predict.averaging.model import AveragedForecast, AveragedModel
 from ..predict.window import ResidualWindow
@@ -111,11 +111,6 @@ class PlanModel:
         """Whether it has learned how the drive's disturbances act."""
         return STATIC in self._solved
 
-    @property
-    def is_trained(self) -> bool:
-        """Whether it has weights of earlier runs."""
-        return self._model.doubts
-
     def outgrows(self, factor: float) -> bool:
         """Return whether the unmodified commands, and the physics model under them, are faster than what is learned.
 
@@ -153,7 +148,8 @@ class PlanModel:
         total: Array = passed.copy()
         for expert, one in self._solved.items():
             weight = weights[expert.place]
-            if weight == 0.0:
+            recalled = weights[RECALL.place] * at.moves if expert is ARX_COMMAND else 0.0
+            if weight + recalled == 0.0:
                 continue
             prediction = at.predictions[expert]
             left = prediction.shrinkage.copy()  # what shrinking and bounds leave of it
@@ -164,7 +160,7 @@ class PlanModel:
                 acted = np.pad(changes, ((self._static.command.dead_time, 0), (0, 0)))[: len(changes)]
                 increments = first_differences(acted)
                 drive = lfilter(one.solution.weights[1 : one.n_static], [1.0], increments, axis=0)
-                total += shrinkage * _recur(one, drive) + weight * (acted - passed)
+                total += (shrinkage + recalled) * _recur(one, drive) + (weight + recalled) * (acted - passed)
             else:
                 total += shrinkage * self._of_disturbances(one, slopes, changes, passed)
         return total

@@ -290,7 +290,7 @@ class AveragedPlanning(Planning):
             return ChosenPlan(SepState.OFF, self.ending(preview), scales)
         g, free = predictor.physics_operator(self.horizon)
         change = _UNPROVEN if model.outgrows(FASTER) else 1.0
-        of_physics_change = 1.0 if model.is_trained else change
+        of_physics_change = 1.0 if averaged.doubts else change
         has_learned = predictor.k >= predictor.n_init and model.has_learned
         follows = has_learned and most is SepState.HYBRID
         tolerance = TOLERANCE._replace(steps=PHYSICS_STEPS) if follows else TOLERANCE

@@ -16,11 +16,16 @@ SIZE = 300
 TS = 1e-3  # s
 
 
+def rows(residuals: Array) -> Array:
+    """Return residuals with commands and leads of none."""
+    return np.stack((residuals, 0.0 * residuals, 0.0 * residuals))
+
+
 def heard(path: Array, residuals: Array, Np: int, ahead: int = 0, known: int | None = None) -> Memory:
     """Return a memory that has heard a path window by window, ``ahead`` samples before it was measured."""
     memory = Memory.init(SIZE, Np)
     for k in range(0, len(path) - ahead, Np):
-        memory = memory.append_commands(path[k : k + Np + ahead], known, Np).remember(residuals[k : k + Np])
+        memory = memory.append_commands(path[k : k + Np + ahead], known, Np).remember(rows(residuals[k : k + Np]))
     return memory
 
 
@@ -45,8 +50,7 @@ def test_the_stretch_is_that_of_a_search(Np: int, windows: int, seed: int) -> No
     found = heard(path, residuals, Np).recalled(Np)
     memory = np.concatenate((np.zeros(SIZE), residuals))
     end = len(memory) - lag_by_search(path, Np, Np)
-    np.testing.assert_array_equal(found[0], memory[end : end + Np])
-    assert found[1] == memory[end - 1]
+    np.testing.assert_array_equal(found.then[0], memory[end - 1 : end + Np])
 
 
 def test_of_stretches_that_are_alike_the_last_one_is_recalled_behind_a_compensator() -> None:
@@ -54,8 +58,8 @@ def test_of_stretches_that_are_alike_the_last_one_is_recalled_behind_a_compensat
     steps, residuals = rng.normal(size=64), rng.normal(size=256)
     path = np.cumsum(np.concatenate((steps, steps, steps + 2e-3 * rng.normal(size=64), steps)))
     memory = heard(path, residuals, 8)
-    np.testing.assert_array_equal(memory.recalled(8, modified=True)[0], residuals[192:200])
-    np.testing.assert_array_equal(memory.recalled(8)[0], residuals[128:136])
+    np.testing.assert_array_equal(memory.recalled(8, 2).then[0], residuals[190:200])
+    np.testing.assert_array_equal(memory.recalled(8).then[0], residuals[127:136])
 
 
 def test_a_path_that_is_known_further_ahead_is_heard_once() -> None:
@@ -72,15 +76,15 @@ def test_behind_a_compensator_repeats_from_the_fourth_on_count_by_a_share() -> N
     steps, memory = rng.normal(size=80), Memory.init(SIZE, 20)
     path = np.concatenate(([0.0], np.cumsum(np.tile(steps - steps.mean(), 7))[:-1]))
     for k in range(0, 560, 20):
-        memory = memory.append_commands(path[k : k + 20], None, 20).remember(np.full(20, float(k // 80)), 20)
-    np.testing.assert_allclose(memory.residuals[-80:], 0.7 * 6 + 0.3 * (0.7 * 5 + 0.3 * 4), rtol=1e-4)
+        memory = memory.append_commands(path[k : k + 20], None, 20).remember(rows(np.full(20, k / 80 // 1)), 20, 1)
+    np.testing.assert_allclose(memory.measured[0, -80:], 0.7 * 6 + 0.3 * (0.7 * 5 + 0.3 * 4), rtol=1e-4)
 
 
 def test_a_memory_shorter_than_a_window_recalls_nothing() -> None:
     for memory in (Memory.init(20, 20), Memory.init(0, 20)):
-        residuals, _, alike = memory.append_commands(np.arange(20.0), None, 20).remember(np.ones(20)).recalled(20)
-        assert alike == 0.0
-        np.testing.assert_array_equal(residuals, 0.0)
+        recalled = memory.append_commands(np.arange(20.0), None, 20).remember(rows(np.ones(20))).recalled(20)
+        assert recalled.alike == 0.0
+        np.testing.assert_array_equal(recalled.then, 0.0)
 
 
 def test_a_repeated_part_is_predicted_by_its_first_time() -> None:
@@ -107,10 +111,9 @@ def test_another_run_begins_at_rest_and_remembers() -> None:
     rng = np.random.default_rng(7)
     path, residuals = np.cumsum(rng.normal(size=200)), rng.normal(size=200)
     again = heard(path, residuals, 20).restart().append_commands(path[:20], None, 20)
-    found, before, alike = again.recalled(20)
-    np.testing.assert_array_equal(found, residuals[:20])
-    assert before == 0.0
-    assert alike == 1.0
+    found = again.recalled(20)
+    np.testing.assert_array_equal(found.then[0], [0.0, *residuals[:20]])
+    assert found.alike == 1.0
 
 
 def test_another_run_recalls_what_was_measured_after_the_same_commands() -> None:
@@ -120,13 +123,12 @@ def test_another_run_recalls_what_was_measured_after_the_same_commands() -> None
     memory = heard(path, residuals, 20, ahead=40).restart()
     path -= path[0]
     for k in range(0, 60, 20):
-        memory = memory.append_commands(path[k : k + 20], None, 20).remember(residuals[k : k + 20])
-    recalled, before, _ = memory.append_commands(path[60:80], None, 20).recalled(20)
-    np.testing.assert_array_equal(recalled, residuals[60:80])
-    assert before == residuals[59]
+        memory = memory.append_commands(path[k : k + 20], None, 20).remember(rows(residuals[k : k + 20]))
+    recalled = memory.append_commands(path[60:80], None, 20).recalled(20)
+    np.testing.assert_array_equal(recalled.then[0], residuals[59:80])
 
 
 def test_another_run_begins_without_a_residual() -> None:
-    memory = Memory.init(SIZE, 20).append_commands(np.arange(20.0), None, 20).remember(np.full(20, 3.0)).restart()
-    assert memory.residuals[-1] == 0.0
-    np.testing.assert_array_equal(memory.residuals[-21:-1], 3.0)
+    memory = Memory.init(SIZE, 20).append_commands(np.arange(20.0), None, 20).remember(rows(np.full(20, 3.0))).restart()
+    assert memory.measured[0, -1] == 0.0
+    np.testing.assert_array_equal(memory.measured[0, -21:-1], 3.0)

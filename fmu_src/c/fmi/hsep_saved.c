@@ -10,7 +10,7 @@
 
 #include "hsep_crc.h"
 
-#define SAVED_VERSION 46U /* changes whenever the layout of any state does */
+#define SAVED_VERSION 47U /* changes whenever the layout of any state does */
 #define SAVED_BYTE_ORDER 0x01020304U
 #define SAVED_MAGIC "HSEPFMI2"
 

@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ...base.signals import Array, mean
+from ...base.signals import Array, first_differences, mean
 from ..regression import PenalisedSolution, RidgeRegression, lags
 from ..window import FeatureScales, ResidualWindow
 from .constants import CONSTANTS
+from .features import StaticFeatures
+from .recall import PULSE, Recalled
 
 MODEL_RESIDUAL, COMMAND_RESIDUAL, N_RESIDUALS = range(3)
 """Residuals that regressions predict, and the rows that they learn: of the physics model, of the command; their
@@ -203,7 +205,8 @@ class ExpertWindow:
     scales: FeatureScales
     rows: Array  # (n, n_static): static features
     predictions: Mapping[Regression, ExpertPrediction]  # of these, of their residuals
-    recalled: tuple[Array, float, float]  # by Memory.recalled
+    recalled: Recalled
+    moves: float  # share of what the command's expert says that a recalled residual moves by
 
     @property
     def bound(self) -> float:
@@ -319,14 +322,50 @@ class Regression(Expert):
 
 @dataclass(frozen=True)
 class Recall(Expert):
-    """What was measured after the commands most like those ahead."""
+    """What was measured after the commands most like those ahead, and under a compensator were others for the drive.
+
+    The physics model says what their difference makes. Where the command's expert answers more to what is fast, it is
+    believed instead: with less than the drive's own answer the same correction, pass by pass, would grow.
+    """
+
+    def before(self, static: StaticFeatures, n: int) -> int:
+        """Return how many samples before those recalled count: half of ``n`` to run the expert in, and its lags."""
+        return n // 2 + static.command.p + 1 if static.n_known is not None else 0
+
+    def moves(self, static: StaticFeatures, solved: Mapping[Regression, SolvedExpert], n: int) -> float:
+        """Return the share of what the command's expert says, in plans of ``n`` samples."""
+        if static.n_known is None or ARX_COMMAND not in solved:
+            return 0.0
+        one, u = solved[ARX_COMMAND], np.minimum(np.arange(1, n + 1) / PULSE, 1.0)
+        pulse = u * (1.0 - u) * u * (1.0 - u) * u * (1.0 - u)
+        own, _ = static.discrete.forced_response(static.discrete.rest(), pulse)
+        drive = lfilter(one.solution.weights[1 : one.n_static], [1.0], first_differences(pulse))
+        e, _ = _recursion(one.lag_weights, drive, np.zeros(len(one.lag_weights)))
+        own_square, square = (float(np.sum(np.diff(x, 2) ** 2)) for x in (own, pulse + e))
+        return 1.0 - own_square / square if own_square < square < np.inf else 0.0
 
     def forecast(self, at: ExpertWindow) -> Array | float:
         """Return it within the bound, moved to the last residual, which fades."""
-        n, Np = len(at.window.x_d), at.model.settings.Np
-        residuals, before, _ = at.recalled
+        n, Np, (then, *_) = len(at.window.x_d), at.model.settings.Np, at.recalled
+        first = len(at.recalled.now[0])
+        residuals, before = then[0, first : first + n], float(then[0, first - 1])
         fade = np.exp(-np.arange(1, n + 1) / (CONSTANTS.recall_fade * Np))
-        return np.asarray(np.clip(residuals[:n] + (at.model.last - before) * fade, -at.bound, at.bound))
+        change = at.moves * self._change(at, first) if at.moves > 0.0 and at.recalled.alike > 0.0 else np.zeros(n + 1)
+        moved = residuals + change[1:] + (at.model.last - before - change[0]) * fade
+        return np.asarray(np.clip(moved, -at.bound, at.bound))
+
+    def _change(self, at: ExpertWindow, first: int) -> Array:
+        """Return what the residual changes by as the commands are others, from the last sample on, ``(1 + n,)``, m."""
+        static, (then, now, *_), one = at.model.static, at.recalled, at.solved[ARX_COMMAND]
+        n, p = len(at.window.x_d), static.command.p
+        late = static.command.late(at.model.run.static.x_d, at.window.x_d)
+        since = np.hstack((now, np.stack((np.zeros(n), late, late - at.window.x_pb)))) - then[:, : first + n]
+        increments = lags(np.diff(since[1]), p + 1)
+        past = (since[0] - since[2])[1 : p + 1][::-1]  # of the command's residual
+        e, _ = _recursion(one.lag_weights, increments @ one.solution.weights[1 : one.n_static], past)
+        most = at.growth * at.bound
+        e = np.clip(np.where(np.isfinite(e), e, 0.0), -most, most)
+        return np.asarray(since[2, first - 1 :] + e[-n - 1 :])
 
 
 _FIRST = 0.5

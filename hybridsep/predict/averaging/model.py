@@ -121,6 +121,7 @@ class AveragedForecast(Forecast):
     # (n_experts,): weights of the experts: RECALL counts as far as the commands are alike, the others for the rest
     shares: Array
     memory: Memory  # with the commands ahead
+    moves: float  # share of ARX_COMMAND's answer in what RECALL predicts
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,9 +267,10 @@ class AveragedModel:
         """
         x, path, held = window.x_pb, window.raw_commands, like.predictions if like else {}
         memory = like.memory if like else self.run.memory.append_commands(path, self.static.n_known, self.settings.Np)
-        recalled = memory.recalled(len(path), modified=self.static.n_known is not None)
+        recalled = memory.recalled(len(path), RECALL.before(self.static, len(path)))
+        moves = like.moves if like else recalled.same * RECALL.moves(self.static, solved, len(path))
         of_physics = of_physics or self.static.rows(self.run.static, window, x, scales.velocity)
-        at = ExpertWindow(self, window, solved, scales, of_physics.rows, {}, recalled)
+        at = ExpertWindow(self, window, solved, scales, of_physics.rows, {}, recalled, moves)
         if STATIC in solved:
             # The stiffness acts at the position, which the physics model by itself does not give well enough. Both
             # predictions are shrunk alike, so that other commands have the same model.
@@ -280,7 +282,7 @@ class AveragedModel:
         for one in EXPERTS:
             stacked[one.place] = one.forecast(at)
         others, weights = self.learned.stack.others(), self.learned.stack.weights
-        (_, _, alike), recall = at.recalled, RECALL.place
+        alike, recall = recalled.alike, RECALL.place
         shares = weights + weights[recall] * (1.0 - alike) * others
         shares[recall] = weights[recall] * alike
         stacked[recall] = alike * stacked[recall] + (1.0 - alike) * (others @ stacked)
@@ -289,7 +291,8 @@ class AveragedModel:
         for one, prediction in predictions.items():
             second[one.place] += prediction.variance
         variance = np.maximum(weights @ second - e_h**2, 0.0)
-        return AveragedForecast(window, e_h, variance, scales, of_physics, x, stacked, predictions, shares, memory)
+        found = (stacked, predictions, shares, memory, moves)
+        return AveragedForecast(window, e_h, variance, scales, of_physics, x, *found)
 
     def forecast(self, window: ResidualWindow, scales: FeatureScales | None = None) -> AveragedForecast:
         """Predict the residual over the next window; ``scales``: a compensator's, else by :meth:`scales_of`."""
@@ -344,7 +347,8 @@ class AveragedModel:
             state = _judged(state, forecast, (e, e_0), accepted, ahead) if accepted.any() else state
         past = tuple(np.concatenate((new[::-1], old))[: len(old)] for new, old in zip((e, e_0), run.past, strict=True))
         n_rejected = run.n_rejected + m - int(accepted.sum())
-        memory = forecast.memory.remember(e, len(window.raw_commands) if self.static.n_known is not None else 0)
+        n, late = len(window.raw_commands), self.static.command.late(run.static.x_d, window.x_d)
+        memory = forecast.memory.remember(np.stack((e, late, e - e_0)), n, RECALL.before(self.static, n))
         run = RunState(static, (past[0], past[1]), gate, n_rejected, memory, run.level)
         return replace(state, run=run), accepted
 

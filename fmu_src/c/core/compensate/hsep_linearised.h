@@ -45,15 +45,15 @@ HSEP_ASSERT_WORDS(hsep_linearised, 18);
 #define LINEARISED_TOGETHER 4 /* samples of a recursion that are summed side by side */
 
 /* Weight in the stack of expert i of those that rows train; 0 if it knows nothing, or predicts another residual. */
-static hsep_real linearised_weight(const hsep_averaged *model, hsep_int i, hsep_int kind)
+static hsep_real linearised_weight(hsep_averaged *model, hsep_int i, hsep_int kind)
 {
     const hsep_int expert = HSEP_REGRESSIONS + i;
     const int of_kind = hsep_averaged_kind_of(model, expert) == kind;
-    return model->predicted[expert] && of_kind ? model->shares[expert] : 0.0;
+    return model->predicted[expert] && of_kind ? model->shares[expert] + hsep_averaged_moves(model, expert) : 0.0;
 }
 
 /* Experts whose disturbances a change passes through. */
-static hsep_int hsep_linearised_experts(const hsep_averaged *model)
+static hsep_int hsep_linearised_experts(hsep_averaged *model)
 {
     hsep_int count = 0;
     for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
@@ -266,11 +266,11 @@ static void hsep_linearised_at(
         const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
         const hsep_real of_model = linearised_weight(model, i, HSEP_MODEL_RESIDUAL);
         const hsep_real weight = of_model + linearised_weight(model, i, HSEP_COMMAND_RESIDUAL); /* one is 0 */
-        const hsep_real *e_h = hsep_at_const(expert, expert->e_h), *at_zero = hsep_at_const(expert, expert->shrinkage);
-        const hsep_real *unshrunk = hsep_at_const(expert, expert->unshrunk);
+        const hsep_real recalled = hsep_averaged_moves(model, HSEP_REGRESSIONS + i);
+        const hsep_real *e = hsep_at_const(expert, expert->unshrunk), *e_h = hsep_at_const(expert, expert->e_h);
         for (hsep_int k = 0, j = n - 1; weight > 0.0 && k < n; k++, j--) { /* what shrinking and bounds leave of it */
-            const hsep_real left = unshrunk[j] == 0.0 ? at_zero[j] : e_h[j] / unshrunk[j];
-            hsep_at(self, self->shrink)[i * n + k] = weight * left;
+            const hsep_real left = e[j] == 0.0 ? hsep_at_const(expert, expert->shrinkage)[j] : e_h[j] / e[j];
+            hsep_at(self, self->shrink)[i * n + k] = (weight - recalled) * left + recalled;
         }
         if (of_model > 0.0) {
             linearised_gains(

@@ -73,6 +73,8 @@
 /* hybridsep/predict/averaging/recall.py */
 #define HSEP_RECALL_UPDATES 25
 #define HSEP_RECALL_ALIKE HSEP_TINY(1e-100)
+#define HSEP_RECALL_PULSE 14
+#define HSEP_RECALL_ROWS 3
 #define HSEP_RECALL_SAME 1e-05
 
 /* hybridsep/predict/averaging/model.py */

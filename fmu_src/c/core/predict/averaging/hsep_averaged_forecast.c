@@ -164,14 +164,13 @@ static void averaged_weigh(hsep_averaged *self, hsep_int place)
     self->shares[HSEP_RECALL] = recalled * self->alike;
 }
 
-/* What is recalled for the window, and how much. last: m, the last residual of the physics model. */
+/* How much counts what is recalled for the window. last: m, the last residual of the physics model. */
 static void averaged_recall(hsep_averaged *self, hsep_real last)
 {
-    hsep_real *recalled = hsep_at(self, self->recalled);
-    self->alike = hsep_recall_forecast(hsep_averaged_recall(self), last, recalled);
-    for (hsep_int j = 0; j < self->n; j++) {
-        recalled[j] = hsep_clip(recalled[j], self->bound);
-    }
+    hsep_recall *recall = hsep_averaged_recall(self);
+    const int moves = recall->same > 0.0 && self->predicted[HSEP_ARX_COMMAND];
+    self->alike = hsep_recall_begin(
+        recall, last, moves ? hsep_expert_weights(hsep_averaged_expert(self, HSEP_ARX_COMMAND)) + 1 : NULL);
     averaged_weigh(self, HSEP_OF_PREDICTIONS);
 }
 
@@ -219,6 +218,10 @@ HSEP_API void hsep_averaged_go_on(
     if (self->predicted[HSEP_ARX_COMMAND]) {
         hsep_command_fill(command, self->n, first, last);
     }
+    hsep_recall_predict(
+        hsep_averaged_recall(self), hsep_expert_weights(hsep_averaged_expert(self, HSEP_ARX_COMMAND)) + 1,
+        hsep_command_late(command, self->n), x_pb, self->bound, self->growth * self->bound, first, last,
+        hsep_at(self, self->recalled));
     for (hsep_int i = HSEP_REGRESSIONS; i < HSEP_REGRESSIONS_END; i++) {
         if (self->predicted[i]) {
             const int of_command = hsep_averaged_kind_of(self, i) == HSEP_COMMAND_RESIDUAL;

@@ -319,7 +319,7 @@ HSEP_API void hsep_averaged_learn(
         averaged_level(self, x_d, e);
     }
     hsep_disturbances_end(hsep_averaged_disturbances(self));
-    hsep_recall_remember(hsep_averaged_recall(self), e);
+    hsep_recall_remember(hsep_averaged_recall(self), e, e_0, hsep_command_late(hsep_averaged_command(self), self->Np));
     if (fold && self->n_accepted > 0.0) {
         averaged_judge(self, e);
     }

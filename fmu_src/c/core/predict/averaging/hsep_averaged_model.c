@@ -84,7 +84,7 @@ HSEP_API void hsep_averaged_init(hsep_averaged *self, const hsep_predictor_param
     }
     hsep_disturbances_init(hsep_averaged_disturbances(self), parameters, start);
     (void)hsep_command_lay_out(hsep_averaged_command(self), parameters);
-    (void)hsep_recall_lay_out(hsep_averaged_recall(self), parameters);
+    hsep_recall_init(hsep_averaged_recall(self), parameters);
     for (hsep_int i = 0; i < HSEP_N_RESIDUALS; i++) {
         hsep_warm_start_init(hsep_averaged_evidence(self, i), averaged_n_features(self, i));
     }

@@ -102,6 +102,13 @@ static inline hsep_disturbances *hsep_averaged_disturbances(hsep_averaged *self)
 }
 static inline hsep_command *hsep_averaged_command(hsep_averaged *self) { return hsep_part(self, self->command); }
 static inline hsep_recall *hsep_averaged_recall(hsep_averaged *self) { return hsep_part(self, self->recall); }
+
+/* Weight in the stack with which what is recalled moves as an expert answers to other commands. */
+static inline hsep_real hsep_averaged_moves(hsep_averaged *self, hsep_int expert)
+{
+    return expert == HSEP_ARX_COMMAND ? hsep_averaged_recall(self)->moves * self->shares[HSEP_RECALL] : 0.0;
+}
+
 static inline hsep_warm_start *hsep_averaged_evidence(hsep_averaged *self, hsep_int kind)
 {
     return hsep_part(self, self->evidence[kind]);
