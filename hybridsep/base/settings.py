@@ -295,7 +295,7 @@ class CompensatorSettings(Settings):
     )
     following_error_max: float = real(
         *(0.0, 0.0, 10.0, "m"),
-        "following error, or its mean with that from x_dm, above which the change fades until reset; 0: none",
+        "following error, or its geometric mean with that from x_dm, at which compensation ends; 0: none",
         display_unit="mm",
         nonzero=1e-12,
         tunable=True,

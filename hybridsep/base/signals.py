@@ -16,8 +16,7 @@ Indices = NDArray[np.intp]
 _Factor = Callable[[str], float] | None
 
 _POSITION_MAX: Mapping[str, float] = {"m": 1e3, "rad": 1e6}
-"""Largest magnitude of a position: beyond any axis, though a rotary one may turn on and on; a larger value is an error
-or in another unit."""
+"""Largest magnitude of a position, beyond any axis, though a rotary one may turn on and on."""
 
 PREDICTION_MAX = 1e100
 """Largest magnitude of a published prediction, m, beyond which the learned recursion counts as diverging: sums of

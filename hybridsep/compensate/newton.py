@@ -226,24 +226,19 @@ def slopes_of(
 
 
 TOLERANCE = Tolerance(1e-4, 1e-2, 1e-5, 5, 100.0)
-"""Of the solver, for the physics model's plan and each Newton step: a plan is judged by the model itself, and taken if
-it is better than the others. With a margin as small as rounding an end that exceeds a bound by a millionth would be no
-plan; with a larger one there may be none within the bounds. From a larger complementarity five steps end farther inside
-the bounds: from that of ``EXACT`` a plan within limits that its command just keeps may change nothing, window after
-window.
-"""
+"""Of the solver, for the physics model's plan and each Newton step. With a margin as small as rounding an end that
+exceeds a bound by a millionth would be no plan; from a larger complementarity five steps end farther inside the bounds:
+from that of ``EXACT`` a plan within limits that its command just keeps may change nothing, window after window."""
 
 FIRST_REACH, _LEAST_REACH, _REACH, _WIDER, _MOST_REACH = 0.1, 0.03, 0.5, 2.0, 1.0
 """Half of the change of velocity that friction's slope is taken over: relative to the model's velocity scale, in the
 first step of a run and at least; and relative to what the last step has changed of the velocity, or would have (RMS). A
-slope over less is blind to a sign that changes nearby, and no way down; one over more sees signs that stay. So where no
-length of a step lowers the cost the next one looks farther by a factor, up to the most: over the same change it would
-be the same step."""
+slope over less is blind to a sign that changes nearby, one over more sees signs that stay. Where no length of a step
+lowers the cost the next one looks farther by a factor, up to the most: otherwise it would be the same step."""
 
 TWICE, THRICE = 15, 5
 """Samples that a plan has from which on it makes two Newton steps, and windows in a plan below which it makes three: a
-sample is planned in that many. In windows of 50 of 200 one step leaves fifteen times the error of two on the stage's X
-axis, warm, and on its Y axis two leave three times the error of three; in windows of 20 one leaves as much as two."""
+sample is planned in that many. In long windows one step leaves up to fifteen times the error of two."""
 
 PHYSICS_STEPS = 3  # of the solver, for the physics model's plan that Newton steps are compared with
 

@@ -231,15 +231,13 @@ def has_stable_poles(w_e: Array) -> bool:
 
 FASTER, _UNPROVEN = 1.25, 0.5
 """Speed of the preview, relative to the fastest motion that was learned, above which plans may change the command by
-this share of ``change_max`` only. ``change_max`` is to be twice the largest error without compensation, so this is that
-error: where a model that has not been compared with such a motion asks for more, it is wrong. The physics model's plan
-may change it by all of ``change_max`` where weights of earlier runs judge it."""
+this share of ``change_max`` only, which is the largest error without compensation: a model that was not compared with
+such a motion and asks for more is wrong. The physics model's plan may take all where earlier runs' weights judge it."""
 
 _TAKEN_BACK, _LEAST_SHARE, _NEAR = 0.2, 0.7, 4
 """A plan takes a share of its change of the last one, which grows or falls by the first times the cosine between what
-it changes and what the last plan has changed, up to 1 and down to the second. Both are taken over this many windows. A
-new plan corrects what was measured last; where a drive is too slow for that, or the model wrong at a frequency, the
-next one takes back what this one has corrected, and the command swings from window to window, also at rest."""
+it changes and what the last plan has changed, up to 1 and down to the second, over this many windows. Where a drive is
+too slow, or the model wrong at a frequency, plans take back what the last one corrected, and the command swings."""
 
 _DOUBT = 0.1
 """Of a change that gains ``g``, m², on the cost of the last plan ``g/(g + d)`` is taken, too, where ``d`` is this share

@@ -22,9 +22,8 @@ _END = PLAN_END  # the settings', which C has among the constants of splines
 _LEAST = 0.1
 """Weight of the last error of a plan of the averaged model: from the middle of the plan on the weights fall to it. A
 plan returns to the command at its end, which takes long within the limits of a fast motion, and its end is never
-carried out: by then other plans have replaced it. Errors that count in full there leave four times the error to a servo
-that lags by 54 ms, in plans of 200 ms. With errors that do not count at all, plans on a model with zeros in the right
-half plane grow from window to window where the preview is short."""
+carried out. Errors that count in full there leave a slow servo four times the error; with errors that do not count,
+plans on a model with zeros in the right half plane grow where the preview is short."""
 
 _RIDGE = 1e-12
 """Added to the diagonal of a plan's cost, relative to its largest entry: rounding cannot leave it indefinite."""

@@ -16,9 +16,8 @@ from .limits import ROUNDING, DriveBounds
 from .splines import N_DECIDED, SplineBasis
 
 _TRIES = 12
-"""Lengths of the way from the last stop to a plan that are tried, all of it first, to a two-thousandth. With 0.8 of the
-last one each time, and none where eight fail, an axis with 50 ms of look-ahead stood 6 mm off: the next window asked
-for the same (``docs/experiments/2026-11-29-stops-by-bisection.md``)."""
+"""Lengths of the way from the last stop to a plan that are tried, all of it first, to a two-thousandth: where none of a
+few larger ones has a stop, an axis stands off (``docs/experiments/2026-11-29-stops-by-bisection.md``)."""
 
 _STILL, _MOST = 1e-12, 10.0
 """Row of the last stop's own part, in limits, below which that part does not matter there; and largest share of it:

@@ -14,8 +14,7 @@ import numpy as np
 from ..base.signals import Array, Indices
 
 _TAPS, _FAR, _SIGNS = 40, 3.0, 5
-"""Taps from this many look-aheads ago, as the integrator of a drive remembers, to one ahead, quadratically: a fast loop
-needs each sample near by, a slow one the look-ahead; and taps of the velocity's sign."""
+"""Taps, from this many look-aheads ago, as a drive's integrator remembers, to one ahead, quadratically; of signs."""
 
 _RIDGE = 1e-6  # penalty of a tap, relative to the mean square of its column: neighbouring taps are nearly alike
 _SLOW = 0.02  # velocity over which friction's sign changes, relative to the largest of the log

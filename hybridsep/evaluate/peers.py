@@ -152,8 +152,7 @@ LAG_HOLD, STATE_SPACE, FROZEN, REFITTED = "lag + hold", "N4SID", "frozen", "refi
 or again before each window."""
 
 _FAR = 10.0
-"""Distance of a prediction from its command, in largest commanded or measured distances from the start, beyond which it
-diverges: no drive gets there."""
+"""Distance of a prediction from its command, in largest distances from the start, beyond which it diverges."""
 
 
 class Piece(NamedTuple):

@@ -24,9 +24,8 @@ from .limits import FOLLOWING_ERROR, STEPS, held_for, largest_motion, rounding_o
 from .replay import Recording, beginnings, replay
 
 _SCALE = 0.05
-"""Velocity scale of what a compensator begins with, relative to the largest velocity of a log. A log's first motion may
-be ten times as fast: then no stop operator is as short as a belt's friction before sliding, and a warm loop has 1.16
-times the error of a cold one instead of 0.97. Mere predictions are 2 % worse with it on recorded axes."""
+"""Velocity scale of what a compensator begins with, relative to the largest velocity of a log: with that of a log's
+first motion no stop operator is as short as friction before sliding. Mere predictions are 2 % worse with it."""
 
 FACTORS = (0.5, 1.0, 2.0)  # by which each limit is changed, one at a time, to say what it costs
 _GAIN = 0.05  # relative gain from which on a limit twice as large, or a longer look-ahead, is advised

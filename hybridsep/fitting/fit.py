@@ -46,8 +46,7 @@ if TYPE_CHECKING:
 _SHARE = 0.5  # share of each log's samples for training; the rest is held out for the test
 
 _TRIED_MAX = 20_000
-"""Leading samples on which settings are tried and a plant is fitted, 20 s at 1 kHz: a fit of a minute's log took twice
-as long without."""
+"""Leading samples on which settings are tried and a plant is fitted: a minute's log took twice as long without."""
 
 Progress = Callable[[str, float], object]
 

@@ -22,7 +22,7 @@ _HELD, STEPS = 0.1, 100  # quantile of the intervals between changes for which a
 
 _ZERO, _VARIES = 10.0, 0.999
 """Offset of command and measurement, relative to what the error varies by in this share of the samples, from which on
-limits do not count it: a compensator would move the axis by as much, and nothing would trip."""
+limits do not count it."""
 
 FOLLOWING_ERROR = 1.3
 """``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no

@@ -24,8 +24,7 @@ _WEAK = 3.0
 """Commanded motion in multiples of the unexplained one (standard deviations) below which only a gain of 1 is taken."""
 
 _LEFT = 0.25
-"""Share of the servo error that a model leaves from which friction may have shaped it: a published machine of which a
-third is left came out with a sixth of its damping; healthy recordings have 0.01 to 0.03."""
+"""Share of the servo error that a model leaves from which friction may have shaped it; healthy recordings: 0.03."""
 
 LITTLE_MOTION = 0.25  # share of samples in motion below which more of it is asked for
 TOO_LITTLE = "too little motion in"  # beginning of the finding that a part of a log tells no dynamics

@@ -82,8 +82,7 @@ def in_time(x_d: Array, x: Array, n_late: int) -> tuple[Array, Array]:
 _EVALUATIONS_MAX = 20  # largest number of iterations of one start; a good one converges within 15
 
 _ROWS_MAX = 4000
-"""Residuals that take part in a search, evenly spaced: the filters run over every sample, but neighbouring residuals
-tell the same."""
+"""Residuals that take part in a search, evenly spaced: neighbouring ones tell the same."""
 
 _DEPENDENT = 1e-12  # size of a direction, relative to the largest, below which columns of unit norm do not span it
 _STEP = 1e-5  # step of the differences of responses, in the logarithm of a parameter

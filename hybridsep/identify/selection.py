@@ -17,8 +17,7 @@ _APART = 2.5
 """Least ratio of frequencies between slow parts and the others: a 14 Hz part of an axis of 35 Hz is one of its own."""
 
 _CANCELLED = 0.25
-"""Static gain of the slow parts, relative to the others', below which zeros all but cancel their poles: with 0.25 zero
-and pole are a quarter apart."""
+"""Static gain of the slow parts, relative to the others', below which zeros all but cancel their poles."""
 
 
 def slow_parts(modes: Sequence[Mode]) -> list[float]:
@@ -66,8 +65,7 @@ _GAIN_MAX = 10.0
 one, by which plans would ask for many times the motion. Small servos under load were recorded at 0.2."""
 
 _GAINS_MAX = 20.0
-"""Largest sum of the modes' gains in multiples of the static gain: above it, large modes cancel each other. In Table 1
-it is 6.6."""
+"""Largest sum of the modes' gains in static gains (Table 1: 6.6): above it large modes cancel each other."""
 
 _SPREAD_MAX = 0.5
 """Largest relative standard deviation of a natural frequency where a structure has several poles to place."""
@@ -80,9 +78,8 @@ held-out error may be what no structure explains, such as a first reversal."""
 
 _CANCELLING_WORTH, _HELD_OUT_WORTH, _MORE_WORTH = 0.6, 0.75, 0.8
 """Ratios of the errors at which a model with a slow part that its zeros all but cancel is taken, geometric mean of
-fitted and held-out ones, and of only the latter: a slow part that fits friction and cables leaves 0.64 to 0.85, one
-that is in the drive's loops less; friction that creeps looks so while it is fitted, and leaves 0.8 to 1 later. And the
-ratio, beside friction, at which poles are taken that are no slow part."""
+fitted and held-out ones, and of only the latter: friction that creeps looks like a slow part while it is fitted. And
+the ratio, beside friction, at which poles are taken that are no slow part."""
 
 _CREEPS = 5.0  # ratio of the rates at which friction may follow the command's sign
 

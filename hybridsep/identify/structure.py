@@ -14,8 +14,7 @@ _ZETA_RANGE = (0.003, 5.0)
 """Damping ratios that are tried; Table 1 has 0.007, and at 5 the two poles are a factor of 98 apart."""
 
 FASTEST = 0.25
-"""Highest natural frequency in multiples of the sampling frequency: with fewer than four samples a period a log does
-not resolve a mode, and its replay is refused."""
+"""Highest natural frequency, in sampling frequencies: with fewer samples a period a replay is refused."""
 
 RATES_MIN = 5.0  # time constants, or periods, of a pole within the recording, at least: slower ones look like drift
 

@@ -38,8 +38,7 @@ relative to theirs: zeros may be apart, or an axis sag, by a thousand times what
 
 _RESOLUTION = 1e-13
 """Least variance of the noise, and least sum of the squares of the rows about the weights, relative to the sum of the
-squares of the targets: the C core has it from a Gram matrix, which does not resolve less, and no less matters before
-10⁷ rows without noise."""
+squares of the targets: the C core has it from a Gram matrix, which does not resolve less."""
 
 
 @dataclass(frozen=True)
@@ -369,8 +368,7 @@ class Recall(Expert):
 
 
 _FIRST = 0.5
-"""First weights: with a fifth for the command's expert, which needs no physics model, a milling machine's first rapid
-has 0.9 times the error, and the stage's spiral 1.1 times; with a third each a drive of ten has 1.6 times."""
+"""First weights: with a share for the command's expert, too, a drive of ten has up to 1.6 times its error."""
 
 HOLD = Hold("hold")
 ARX_RESIDUAL = Regression("arx_residual", _FIRST)

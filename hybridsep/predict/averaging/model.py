@@ -49,9 +49,8 @@ from .warm_start import WarmStartRows
 
 _LITTLE = 0.1  # motion of the command, relative to a residual, beside which that is an offset
 _AHEAD = 20
-"""Samples before the end of a window, half of it at most, at which the noise variances for the next solve are frozen.
-
-An approximation, for controllers: they factor most of that solution in them."""
+"""Samples before the end of a window, half of it at most, at which the noise variances for the next solve are frozen:
+an approximation, for controllers, which factor most of that solution in them."""
 
 
 @dataclass(frozen=True, eq=False)

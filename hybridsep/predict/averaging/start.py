@@ -21,8 +21,7 @@ motion: from rest a jerk-limited command needs time."""
 _SAMPLES = 2  # samples for each number of the state that are needed: with one, noise at rest may be explained as motion
 
 _DAMPING = 1e-3
-"""Ridge penalty on the change of the state, relative to a response of unit gain: modes that decay at once are not
-determined."""
+"""Ridge penalty on the change of the state, relative to a response of unit gain: fast modes are not determined."""
 
 
 class MotionBefore(NamedTuple):

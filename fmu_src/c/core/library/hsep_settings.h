@@ -59,7 +59,7 @@
     SETTING(compensator, hsep_real, j_max, 5000.0, 1e-06, 1000000000000.0, 0.0, 1e-06, 0) \
     /* largest change of the command, m */ \
     SETTING(compensator, hsep_real, change_max, 0.001, 1e-12, 10.0, 0.0, 1e-12, 0) \
-    /* following error, or its mean with that from x_dm, above which the change fades until reset; 0: none, m */ \
+    /* following error, or its geometric mean with that from x_dm, at which compensation ends; 0: none, m */ \
     SETTING(compensator, hsep_real, following_error_max, 0.0, 0.0, 10.0, 1e-12, 0.0, 0) \
     /* whether plans of a linear model keep x_dm from turning while x_d moves */ \
     SETTING(compensator, hsep_int, no_reversal, 1.0, 0.0, 1.0, 0.0, 0.0, 0) \
