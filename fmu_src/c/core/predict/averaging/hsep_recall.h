@@ -259,7 +259,7 @@ static inline hsep_real hsep_recall_begin(hsep_recall *self, hsep_real last, con
     self->offset = last - residuals[recall_then(self, 0)];
     const hsep_real distance = hsep_at_const(self, self->distances)[self->lag - 1];
     self->alike = distance > 0.0 ? tolerated / (tolerated + distance) : 0.0;
-    if (weights != NULL) {
+    if (weights != NULL && self->alike > 0.0) {
         const hsep_real square = recall_square(self, weights);
         self->moves = self->own < square && square < INFINITY ? 1.0 - self->own / square : 0.0;
         /* as far as the path is the same, so that commands differ by what was planned */
