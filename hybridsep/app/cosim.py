@@ -203,10 +203,8 @@ def _path_limits(axis: Machine) -> tuple[float, ...]:
 
 
 def _command(trajectory: str | None, machine: str, axis: Machine, unit: str | None) -> tuple[str, Array, str]:
-    """Return the trajectory that is meant, its samples at the machine's interval, and the unit of its file or "".
-
-    Where none is given it is a fit's commands beside the machine file, else the staircase.
-    """
+    """Return the trajectory that is meant, its samples at the machine's interval, and the unit of its file or ""."""
+    # Where none is given it is a fit's commands beside the machine file, else the staircase
     from ..logs.log import check_reading, read_log
     from ..plants.trajectory import PAPER_LIMITS, spiral, staircase
 

@@ -91,10 +91,8 @@ def _description(path: Path, *_file: int) -> Any:
 
 @contextmanager
 def _working_directory() -> Iterator[Path]:
-    """Give the process's working directory to one thread at a time, and restore it.
-
-    fmpy changes it, for the whole process, while it loads a library, and leaves it changed if that fails.
-    """
+    """Give the process's working directory to one thread at a time, and restore it."""
+    # fmpy changes it, for the whole process, while it loads a library, and leaves it changed if that fails
     with _LOADING:
         try:
             folder = Path.cwd()

@@ -75,10 +75,8 @@ def choose_settings(
 
 
 def _trained_rms(model: ModalModel, settings: PredictorSettings, recordings: Sequence[Recording]) -> float:
-    """Return the RMS of the hybrid's error over the later half of the training samples, m.
-
-    The earlier half shows which learns fastest, but machines run warm.
-    """
+    """Return the RMS of the hybrid's error over the later half of the training samples, m."""
+    # The earlier half shows which learns fastest, but machines run warm
     training = [Recording(*one.training, 0) for one in recordings if one.n_train]
     errors = replay(HybridPredictor(model, settings), training).errors()[2]
     return known_rms(errors[len(errors) // 2 :])

@@ -63,10 +63,8 @@ def rounding_of(x_d: Array) -> float:
 
 
 def _motion(x_d: Array, T_s: float) -> list[float]:
-    """Return the largest velocity, acceleration and jerk of commands, ``(n,)``, without what holds and rounds them.
-
-    Differences are over as many samples as a command is held for, and as make its rounding small against them.
-    """
+    """Return the largest velocity, acceleration and jerk of commands, ``(n,)``, without what holds and rounds them."""
+    # Differences are over as many samples as a command is held for, and as make its rounding small against them
     held = held_for(x_d)
     x_d, T_s = x_d[::held], held * T_s
     rounding, found = rounding_of(x_d), []

@@ -88,10 +88,8 @@ def _drive_rows(spec: FmuSpec) -> Rows:
 
 @one_blas_thread
 def _look_ahead_rows(spec: FmuSpec) -> Rows:
-    """Return the rows of a look-ahead under the staircase, through two windows of prediction.
-
-    What a command leads to, of a compensator the modified one, is measured at the physics model, 2 % off.
-    """
+    """Return the rows of a look-ahead under the staircase, through two windows of prediction."""
+    # What a command leads to, of a compensator the modified one, is measured at the physics model, 2 % off
     machine, parameters, names = spec.machine, spec.table.parameters, list(spec.table.named("output"))
     settings = PredictorSettings.from_fmi(parameters)
     predictor, compensates = HybridPredictor(machine.model, settings), "x_dm" in names

@@ -63,10 +63,8 @@ def _structure(
     stop_time: float,
     ssp: str,
 ) -> bytes:
-    """Return ``SystemStructure.ssd``; connections are of component and output to component and input.
-
-    OMSimulator needs annotations of the system, with the communication step size, and of the default experiment.
-    """
+    """Return ``SystemStructure.ssd``; connections are of component and output to component and input."""
+    # OMSimulator needs annotations of the system, with the communication step size, and of the default experiment
     root = _root("ssd", "SystemStructureDescription", name, ssp)
     root.set("generationTool", f"hybridsep {__version__}")
     system = _add(root, "ssd:System", name=name)

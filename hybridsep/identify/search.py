@@ -111,10 +111,8 @@ def _starts(structure: Structure, known: Mapping[Structure, Fit], T_s: float, ra
 
 
 def _bandwidth(segments: Sequence[Segment], T_s: float, known: Mapping[Structure, Fit]) -> float:
-    """Return the bandwidth, rad/s: of the fitted lag and its dead time, or of what the servo error tells if less.
-
-    The error is about ``velocity · lag + acceleration/ω²``; with velocity feed-forward there is no lag.
-    """
+    """Return the bandwidth, rad/s: of the fitted lag and its dead time, or of what the servo error tells if less."""
+    # The error is about velocity · lag + acceleration/ω²; with velocity feed-forward there is no lag
     lags = [fit for structure, fit in known.items() if structure.lag and not structure.n_modes]
     moving = [(s, np.gradient(s.u[: s.stop], T_s)) for s in segments if s.stop > 1]
     rows = [np.column_stack((v, np.gradient(v, T_s), (s.u - s.y)[: s.stop]))[s.known[: s.stop]] for s, v in moving]

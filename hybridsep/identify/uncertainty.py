@@ -55,10 +55,8 @@ def _sandwich(jacobian: Array, scores: Array) -> Array:
 
 
 def _jacobian(fit: Fit, segments: Sequence[Segment], T_s: float) -> tuple[Array, Array]:
-    """Return derivatives of the position with respect to θ, linear parameters, dead time and offset, and residual.
-
-    What initial states explain is projected out.
-    """
+    """Return derivatives of the position with respect to θ, linear parameters, dead time and offset, and residual."""
+    # What initial states explain is projected out
     problem = Problem(segments, T_s, fit.structure, fit.delay, sum(segment.stop for segment in segments))
     (gains, betas), theta, blocks, residuals = fit.structure.gains(fit.linear), fit.theta.tolist(), [], []
     for i, segment in enumerate(segments):

@@ -101,10 +101,7 @@ class PaperModel:
         return np.asarray(g_h), free_pb + self._free_run(free_pb)
 
     def _free_run(self, x_pb: Array) -> Array:
-        """Return ``wᵀφ`` over a window in free run, ``(n,)``, m; eq. (4).
-
-        ``x_pb``, (n,), m: physics-based prediction, relative to the start.
-        """
+        """Return ``wᵀφ`` over a window ``x_pb``, relative to the start, in free run, ``(n,)`` both, m; eq. (4)."""
         w, w_e = self.regression.weights, self.lag_weights
         # Exogenous part: w₀ + Σ_i w_x,i x_pb(k−i)
         drive = w[0] + np.convolve(np.concatenate((self.x_pb, x_pb)), w[1 : -len(w_e)], "valid")

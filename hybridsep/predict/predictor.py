@@ -195,10 +195,8 @@ class HybridPredictor:
         return Prediction(x_pb[late:] + start, forecast.e_h[late:], std, self._warm_up(n))
 
     def _with_error(self, forecast: Forecast) -> PredictedWindow:
-        """Return the window of a forecast with what is known of its error, pending measurement.
-
-        With a ``measurement_delay`` the window begins that many samples earlier: they are not measured yet.
-        """
+        """Return the window of a forecast with what is known of its error, pending measurement."""
+        # With a measurement_delay the window begins that many samples earlier: they are not measured yet
         x_pb, n = forecast.window.x_pb, len(forecast.e_h)
         active = np.arange(n) >= self._warm_up(n, late=len(self.state.late))
         e_h, variance = np.where(active, forecast.e_h, 0.0), np.where(active, forecast.variance, 0.0)

@@ -410,10 +410,8 @@ def _judged_experts(
 
 
 def _bridged(e_h: Array, measured: Array, accepted: NDArray[np.bool_]) -> Array:
-    """Return residuals; where they are not accepted the predicted ones, with the error of those beside them.
-
-    It is interpolated, 0 before the first one.
-    """
+    """Return residuals; where they are not accepted the predicted ones, with the error of those beside them."""
+    # It is interpolated, 0 before the first one
     known = np.flatnonzero(accepted)
     places, errors = np.concatenate(([-1], known)), np.concatenate(([0.0], (measured - e_h)[known]))
     return np.where(accepted, measured, e_h + np.interp(np.arange(len(measured)), places, errors))
