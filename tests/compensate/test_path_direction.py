@@ -69,10 +69,8 @@ def test_the_rest_of_a_plan_that_turned_is_still_a_plan(seed: int) -> None:
 
 @pytest.mark.slow
 def test_friction_that_follows_the_command_makes_turning_dear(fmus: BuiltFmus) -> None:
-    """The stage's Y axis, physics model: 126.7 µm where the command keeps its direction, 128.4 where it need not.
-
-    By the native FMUs, in a tenth of the library's time; they command as it does (cosim/test_loop.py).
-    """
+    """The stage's Y axis, physics model: 126.7 µm where the command keeps its direction, 128.4 where it need not."""
+    # By the native FMUs, in a tenth of the library's time; they command as it does (cosim/test_loop.py)
     pair, found = (fmus("SepCompensator_als25010_y"), fmus("FeedDrive_als25010_y")), {}
     for keep in (True, False):
         values = {"averaging": False, "compensate": PARAMETERS["compensate"].to_fmi("physics"), "no_reversal": keep}

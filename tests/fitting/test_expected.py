@@ -27,10 +27,8 @@ MACHINE = machine_of(
 def test_fmu_and_library_leave_the_same(
     late: int, compensate: str, apart: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a command 2 mm from zero, measured with friction and an offset, samples missing.
-
-    Plans are longer than the preview, in which rounding may grow further: to 3e-11 m in one.
-    """
+    """Of a command 2 mm from zero, measured with friction and an offset, samples missing."""
+    # Plans are longer than the preview, in which rounding may grow further: to 3e-11 m in one
     friction = 1e-5 * np.tanh(np.gradient(MOVES) / T_S / 1e-3)
     discrete = SERVO.discretise(T_S)
     x = discrete.forced_response(discrete.rest(), MOVES)[0] - friction + 0.00201

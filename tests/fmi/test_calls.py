@@ -322,10 +322,8 @@ def test_steps_take_no_memory_and_reset_gives_it_back(fmu2: Library) -> None:
 
 
 def test_an_instance_asks_for_little_more_than_its_arrays(fmu2: Library) -> None:
-    """With the paper's model; each learns a little and is saved, restored and reset.
-
-    Of its n = 2 + p + q features it has a factor, each entry with what rounding took from it, and windows.
-    """
+    """With the paper's model; each learns a little and is saved, restored and reset."""
+    # Of its n = 2 + p + q features it has a factor, each entry with what rounding took from it, and windows
     Np, p, q = 100, 50, 3
     n = 2 + p + q
     least = 8 * (n * (n + 1) + 14 * Np + len(fmu2.references))

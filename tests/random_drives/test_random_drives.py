@@ -46,10 +46,8 @@ from hybridsep.model.physics import ModalModel
 def test_the_drives_stay_what_they_are(
     generator: ModuleType, indices: tuple[int, ...], kinds: str, measured: list[float], true: list[float]
 ) -> None:
-    """Figures are given for the drives of a seed, so a change must not pass unseen: these have each nonlinearity.
-
-    That they are exact where they are linear, and their steps short enough, was measured when they were made.
-    """
+    """Figures are given for the drives of a seed, so a change must not pass unseen: these have each nonlinearity."""
+    # That they are exact where they are linear, and their steps short enough, was measured when they were made
     drives = generator.random_drives(indices, 1)
     assert " ".join(drive.kind for drive in drives) == kinds
     assert [1e6 * rms(drive.x_meas - drive.x_d) for drive in drives] == pytest.approx(measured, rel=1e-6)  # µm

@@ -31,10 +31,8 @@ FMI3 = [name for name, (_, _, fmi) in _FMUS.items() if fmi == "3"]
 
 
 def each_kind(values: Sequence[str] | Sequence[tuple[str, ...]]) -> list[Any]:
-    """Return names of FMUs, or tuples that end in one, as pytest parameters; some machines' run at night.
-
-    The stage's Y drive differs from its X drive only in numbers, and the rotary machine from the default one.
-    """
+    """Return names of FMUs, or tuples that end in one, as pytest parameters; some machines' run at night."""
+    # The stage's Y drive differs from its X drive only in numbers, and the rotary machine from the default one
     rows = [(value,) if isinstance(value, str) else value for value in values]
     return [pytest.param(*row, marks=_AT_NIGHT if row[-1].endswith(("_als25010_y", "_emps")) else []) for row in rows]
 

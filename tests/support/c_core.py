@@ -45,10 +45,8 @@ def model_sources() -> list[str]:
 
 @cache
 def object_files(flags: tuple[str, ...] = ("-O1", "-fPIC"), command: tuple[str, ...] = ()) -> list[str]:
-    """Compile all other C files, once for each set of options, with the host's compiler if no other is asked for.
-
-    All processes of a session share them. ``-O2`` takes twice as long, for tests that compute for little of their time.
-    """
+    """Compile all other C files, once for each set of options, with the host's compiler if no other is asked for."""
+    # All processes of a session share them. -O2 takes twice as long, for tests that compute for little of their time
     key = hashlib.sha256(repr((flags, command)).encode()).hexdigest()[:16]
     compiled = sorted(set(sources()) - set(model_sources()))
 

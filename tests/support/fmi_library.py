@@ -113,10 +113,8 @@ class Library:
         callbacks: Any = None,
         **odd: Any,
     ) -> int | None:
-        """Return an instance, or None if it was refused.
-
-        Without callbacks those that log and count, none for False; ``odd`` are the arguments that only one version has.
-        """
+        """Return an instance, or None if it was refused."""
+        # Without callbacks those that log and count, none for False; odd are the arguments that only one version has
         token, place = (self.guid if guid is None else guid).encode(), None if resources is None else resources.encode()
         instance: int | None = self._instantiated(name, token, place, logging_on, callbacks, odd)
         return instance

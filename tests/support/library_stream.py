@@ -66,10 +66,8 @@ def trained_state(kind: str) -> Path:
 
 
 def runaway_predictor() -> HybridPredictor:
-    """Return a predictor of the default machine, without warm-up, whose learned recursion diverges.
-
-    It has a bias and one past residual, so firmly learned that a run changes nothing.
-    """
+    """Return a predictor of the default machine, without warm-up, whose learned recursion diverges."""
+    # It has a bias and one past residual, so firmly learned that a run changes nothing
     machine = paper_machine("spring_mass_damper")
     predictor = machine.new_predictor(replace(machine.predictor_settings, t_init=0.0))
     weights = np.zeros(predictor.regression.n_features)

@@ -70,10 +70,8 @@ def ridge(rows: Array, target: Array, lam: float) -> Array:
 
 
 def ridge_extended(rows: Array, target: Array, lam: float) -> NDArray[np.longdouble]:
-    """Eq. (6), solved from all rows to the digits of long double; ``(m, n), (m,) → (n,)``.
-
-    A double solution is refined, its residuals in long double: Björck, BIT 7 (1967), 257.
-    """
+    """Eq. (6), solved from all rows to the digits of long double; ``(m, n), (m,) → (n,)``."""
+    # A double solution is refined, its residuals in long double: Björck, BIT 7 (1967), 257
     n, long = rows.shape[1], np.longdouble
     A, b = np.vstack((np.sqrt(long(lam)) * np.eye(n), rows)), np.concatenate((np.zeros(n), target)).astype(long)
     scale = np.sqrt(np.sum(A * A, axis=0))

@@ -65,10 +65,8 @@ def random_loop(seed: int, n: int, **fixed: float) -> RandomLoop:
 
 
 def run(stream: Stream, loop: RandomLoop, *, nudged: bool = False) -> tuple[Array, Array]:
-    """Return ``x_dm``, m, and ``sep_state`` of every sample, ``(n,)`` both.
-
-    Where the loop is ``nudged``, the last binary place of each measured position is one more.
-    """
+    """Return ``x_dm``, m, and ``sep_state`` of every sample, ``(n,)`` both."""
+    # Where the loop is nudged, the last binary place of each measured position is one more
     machine, start = machine_of(stream.model), float(loop.r[0])
     assert machine.plant is not None
     plant, encoder = machine.new_plant(), Encoder(machine.plant.noise_std, loop.noise_seed)
