@@ -225,14 +225,14 @@ class ParquetSource(TableSource):
             arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
         except ModuleNotFoundError as error:
             raise LogError(f"{path}: is a Parquet file, which needs: pip install 'hybridsep[parquet]'") from error
-        with _reading(path, "a Parquet file"):
-            table = parquet.read_table(path)
+        with _reading(path, "a Parquet file"), parquet.ParquetFile(path) as file:
+            table = file.read()
             while any(map(arrow.types.is_struct, table.schema.types)):
                 table = table.flatten()
-        times = {field.name: field.type for field in table.schema if arrow.types.is_time(field.type)}
-        for name, kind in times.items():
-            counts = table.column(name).cast(arrow.int32() if kind.bit_width == 32 else arrow.int64())
+        times = [(i, field.type) for i, field in enumerate(table.schema) if arrow.types.is_time(field.type)]
+        for i, kind in times:
+            counts = table.column(i).cast(arrow.int32() if kind.bit_width == 32 else arrow.int64())
             seconds = past_midnights(counts.to_numpy() * TIME_UNITS[kind.unit].factor, 86_400.0)
-            table = table.set_column(table.column_names.index(name), name, arrow.array(seconds - seconds[:1]))
+            table = table.set_column(i, table.column_names[i], arrow.array(seconds - seconds[:1]))
         super().__init__(table, path)
-        self.units = {**self.units, **dict.fromkeys(times, "s")}
+        self.units = {**self.units, **{self.names[i]: "s" for i, _ in times}}

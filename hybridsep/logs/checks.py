@@ -215,13 +215,9 @@ def following(u: Array, x: Array) -> _Following:
     h, _ = nnls(R, basis.T @ y, maxiter=len(lags) ** 2)
     left = float(np.sum((y - A @ h) ** 2) / (y @ y))
     gain = float(h.sum())
-    return _Following(
-        left,
-        gain * total / scale,
-        float(h @ lags) / gain if gain > 0.0 else 0.0,
-        float(products[one] / squares[one]) * total / scale if squares[one] > 0.0 else 0.0,
-        int(near[best]),
-    )
+    lag = float(h @ lags) / gain if gain > 0.0 else 0.0
+    at_one = float(products[one] / squares[one]) if squares[one] > 0.0 else 0.0
+    return _Following(left, gain * total / scale, lag, at_one * total / scale, int(near[best]))
 
 
 def _lagged(u: Array, lags: Indices, known: NDArray[np.bool_]) -> Array:
@@ -242,13 +238,8 @@ def _meaning(log: Log, x_d: Array, x: Array, given: _Following) -> Iterator[Find
         flipped = following(*((x_d, 2.0 * x_d - x) if "x_d" in log.columns else (2.0 * filled - x_d, x)))
         if _BETTER_SWAPPED * flipped.left < given.left and flipped.lag >= 1.0:  # much feed-forward leads a little
             words = "the position that the error tells runs ahead: the error is the other way, its sign is flipped"
-            yield Finding(
-                "sign",
-                words,
-                evidence,
-                refused=True,
-                options=((error_option(log.columns["error"], -1), "the error's other sign"),),
-            )
+            other_sign = ((error_option(log.columns["error"], -1), "the error's other sign"),)
+            yield Finding("sign", words, evidence, refused=True, options=other_sign)
             return
     elif better * exchanged.left < given.left and exchanged.lag >= 1.0:
         words = (

@@ -3,7 +3,7 @@
 import re
 import shlex
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -50,7 +50,9 @@ def choose_columns(
     error = given.pop("error", None)
     beside = beside_error(source.names, error) if error and axis is None and not {"x_d", "x"} & given.keys() else {}
     chosen, remarks = ({"x_d": None, "x": None, **beside}, []) if beside else _positions(source, given, axis)
-    time = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
+    time = None
+    with nullcontext() if time_needed else suppress(LogError):  # there may be several, none of which is needed
+        time = _name(source, "t", given["t"]) if "t" in given else _time_of(source, chosen["x_d"] or "")
     if time is None and "t" not in given:
         time = _only_time(source)
         if time is not None and not time_needed and not (_steps(source, time) > 0.0).any():

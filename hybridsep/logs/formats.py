@@ -18,16 +18,8 @@ from .twincat import TwinCatSource
 
 EXAMPLE = Path(__file__).with_name("example_axis.csv.gz")  # the example log, 20 s of a simulated axis at 1 kHz
 
-READERS: tuple[type[Source], ...] = (
-    NpzSource,
-    ParquetSource,
-    MatSource,
-    CaptureSource,
-    SinumerikSource,
-    TwinCatSource,
-    HalscopeSource,
-    TextSource,
-)
+READERS: tuple[type[Source], ...] = (NpzSource, ParquetSource, MatSource, CaptureSource, SinumerikSource)
+READERS += (TwinCatSource, HalscopeSource, TextSource)
 """Readers by precedence; text, which has no mark of its own, is last."""
 
 _SAVE = "save its columns t, x_d and x as CSV"

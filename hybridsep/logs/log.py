@@ -384,9 +384,7 @@ def _shifted(given: Log, delay: int) -> tuple[Log, str]:
     parts = [part for part in given.segments() if len(part.t) > abs(delay)]
     if not parts:
         raise ParameterError(f"--delay must be less than the samples of a segment, got {delay}")
-    here, there = slice(-delay, None), slice(None, delay)
-    if delay > 0:
-        here, there = slice(None, -delay), slice(delay, None)
+    here, there = (slice(max(n, 0), min(n, 0) or None) for n in (-delay, delay))
     parts = [replace(_at(part, here), x_meas=part.x_meas[there]) for part in parts]
     way = f"{abs(delay)} samples {'earlier' if delay > 0 else 'later'}"
     return _joined(parts), f"the measured position is taken {way} than recorded (--delay {delay})"

@@ -37,8 +37,8 @@ _COMMANDED = {"cmd", "command", "commanded", "ref", "reference", "set", "setpoin
 _COMMANDED |= {"goal", "action", "commands", "demand", "nominal", "noml", "planned", "consigne", "soll", "sollwert"}
 _COMMANDED |= _SOLL
 _MEASURED = {"act", "actual", "meas", "measured", "measurement", "fb", "feedback", "enc", "encoder", "pv", "ist"} | _IST
-_MEASURED |= {"mesure", "istwert", "present", "observation"}
-_ESTIMATED = {"estimate", "estimated"}  # measured where nothing else is
+_MEASURED |= {"mesure", "istwert", "present"}
+_ESTIMATED = {"estimate", "estimated", "observation"}  # measured where nothing else is
 _POSITION = {"pos", "position", "positions", "lage", "weg", "angle", "pl", "pctrl", "pulses"} | _SOLL | _IST
 _FILLING = {"axis", "value", "values", "data", "state", "states", "current"}
 _SENT = {"control", "input"}  # commanded beside a word for the position, else a controller's output
@@ -46,7 +46,7 @@ _VELOCITY = {"vel", "velo", "velocity", "velocities", "speed", "speeds", "geschw
 _ERROR = {"error", "err", "errors", "diff", "posdiff", "deviation", "droop", "schleppfehler", "schleppabstand"}
 _ERROR |= {"fe", "ferr", "ferror", "poserr"}
 # of a whole move or of another instant; ACS has DPOS beside RPOS
-_LATER = re.compile("target|goal|planned|nominal|(?<![a-z])[dmt]pos(?![a-z])", re.IGNORECASE)
+_LATER = re.compile("target|goal|action|planned|nominal|(?<![a-z])[dmt]pos(?![a-z])", re.IGNORECASE)
 _NO_POSITION = _VELOCITY | _ERROR | {"acc", "acceleration", "accelerations", "jerk", "torque", "frequency"}
 _TIME = {"time", "timestamp", "zeit", "zeitstempel", "temps"}
 """Words within names, in small letters; what is left of a name beside those of positions and what fills is the axis."""
@@ -134,7 +134,13 @@ def beside_error(names: Sequence[str], error: str = "") -> dict[str, str]:
     commanded, measured, _ = _by_words(names)
     words, both = _words(error), {axis: {"x_d": x_d, "x": x} for axis, (x_d, x) in axes_of(names).items()}
     alone = {axis: {"x": x} for axis, x in measured.items() if words or not commanded}
-    for known in (both, alone | {axis: {"x_d": x_d} for axis, x_d in commanded.items()}):
+    alone |= {axis: {"x_d": x_d} for axis, x_d in commanded.items()}
+    if words and not {*known_names("x_d", names), *known_names("x", names)} <= {
+        *commanded.values(),
+        *measured.values(),
+    }:
+        return {}  # names of no axis come first
+    for known in (both, {} if words and "" in commanded else alone):
         own = {axis: _words(axis) for axis in known}
         n = {axis: len(own[axis] & words) for axis in own if not words or (own[axis] and own[axis] <= words)}
         best = [axis for axis in n if n[axis] == max(n.values())]

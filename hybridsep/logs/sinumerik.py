@@ -113,21 +113,17 @@ class SinumerikSource(GivenSource):
         super().__init__(path, columns)
         self.times, self.units = times, dict.fromkeys(clocks.values(), "s")
         self.assumed_units = {name: "mm" for name, signal in self._signals.items() if signal.kind == "posn"}
-        self.axes = self._positions()
+        self.axes = {}
+        for x_d, signal in self._signals.items():
+            beside = {name: one.name for name, one in self._signals.items() if one.axis == signal.axis}
+            there = [name for pattern in _MEASURED for name, own in beside.items() if pattern.search(own)]
+            if there and signal.axis not in self.axes and _COMMANDED.search(signal.name):
+                self.axes[signal.axis] = x_d, there[0]
 
     @staticmethod
     def recognises(head: bytes) -> bool:
         """Return whether it is XML with a trace session near its beginning."""
         return head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"<") and b"<traceSession" in head
-
-    def _positions(self) -> dict[str, tuple[str, str]]:
-        found: dict[str, tuple[str, str]] = {}
-        for x_d, signal in self._signals.items():
-            beside = {name: other.name for name, other in self._signals.items() if other.axis == signal.axis}
-            there = [name for pattern in _MEASURED for name, own in beside.items() if pattern.search(own)]
-            if there and _COMMANDED.search(signal.name):
-                found.setdefault(signal.axis, (x_d, there[0]))
-        return found
 
 
 _COUNTER = "CYCLE"

@@ -33,7 +33,7 @@ _BLOCK = 10_000  # lines that are converted at once
 _COMMENTS = ("#", "%", "//", "!")  # beginnings of a comment line
 
 _DELIMITERS = (";", "\t", ",", "|", None)  # delimiters by precedence; None is blanks
-_UNIT_ROW = re.compile("unit|einheit", re.IGNORECASE)  # in the first cell of a row of units
+_UNIT_ROW = re.compile("units?|einheit(en)?|y_unit_label|trace_unit", re.IGNORECASE)  # first cell of a row of units
 _HEAD = 4  # rows above the numbers of which one has the names: units and descriptions may be below it
 _FACTOR = re.compile(r"[x*×/]\s*[.,\d]")  # begins a cell of a row of factors, which no reader may pass over
 _WITH_UNIT = re.compile(r"^([+-]?[\d.,]+(?:e[+-]?\d+)?)\s+([a-zµ]+)$", re.IGNORECASE)  # 0.001 sec, as of MATLAB
@@ -383,9 +383,11 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
 
 def _width(fields: Sequence[str]) -> int:
     """Return the number of fields of a row of numbers, 0 if more than half of them are neither that nor missing."""
-    others = [text for text in fields if not (_is_written(text) or _WITH_UNIT.match(text))]
-    texts = [text for text in others if text and not _MISSING.fullmatch(text) and not stamp_kind(text)]
-    return len(fields) if len(fields) > len(others) and len(fields) - len(others) >= len(texts) else 0
+    others = [text for text in fields if text and not (_is_written(text) or _MISSING.fullmatch(text))]
+    n = sum(map(_is_written, fields))
+    texts = [text for text in others if not stamp_kind(text)]
+    of_units = sum(map(bool, map(_WITH_UNIT.match, texts)))  # numbers, but for a preamble's: Rate, 1000 Hz
+    return len(fields) if (n and n >= len(texts)) or 0 < of_units == len(texts) else 0
 
 
 def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int, mark: str | None) -> _Table | None:
@@ -395,7 +397,6 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
     blank = next(i for i in range(width) if any(row[width - 1 - i] for row in fields))  # at the ends of rows
     kinds = [_kind([row[i] for row in fields]) for i in range(width)]
     above: list[tuple[int, list[str]]] = []
-    apart = False  # whether other comments stand between
     for number, _, line in reversed(rows[:start]):
         names = _names(line, mark)
         if mark is None and len(names) == width - 1 and ("date", "time") in pairwise(kinds):
@@ -406,10 +407,9 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
         if len(names) == width - blank - 1 and (blank == 0) and _are_row_names([row[0] for row in fields]):
             names = ["", *names]
         fits = width - blank <= len(names) <= width
-        is_comment = line.lstrip().startswith(_COMMENTS)
         if fits and not all(map(is_number, names)) and not any(map(stamp_kind, names)):
-            above += [(number, names)] if n_known(names) or not (apart and is_comment) else []
-        elif not (apart := is_comment):
+            above.append((number, names))
+        elif not line.lstrip().startswith(_COMMENTS):
             break
     if not above:
         return None
@@ -419,10 +419,10 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
     at = max(near, key=lambda i: (n_known(above[i][1]), -i))  # the one with more known names counts, else the nearest
     header, names = above[at]
     below = (row for (_, row), is_units in zip(above[:at], of_units, strict=False) if is_units)
-    keyed = (row for _, row in above[:9] if row is not names and _UNIT_ROW.search(row[0]) and _is_row_of_units(row[1:]))
+    keyed = (row for _, row in above[:9] if row is not names and _UNIT_ROW.fullmatch(row[0]))
     units = dict(zip(names, next(below, ["", *next(keyed, [""])[1:]]), strict=False))
-    behind = [{_WITH_UNIT.sub(r"\2", row[i]) for row in fields[:9] if row[i]} for i in range(len(names))]
-    in_cells = {i: next(iter(one)) for i, one in enumerate(behind) if len(one) == 1 and _is_row_of_units([*one])}
+    behind = [[(_WITH_UNIT.match(row[i]) or ("",) * 3)[2] for row in fields[:9] if row[i]] for i in range(len(names))]
+    in_cells = {i: one[0] for i, one in enumerate(behind) if len({*one}) == 1 and _is_row_of_units(one)}
     units |= {names[i]: unit for i, unit in in_cells.items()}
     bare = [[row[i].removesuffix(in_cells.get(i, "")).rstrip() for row in fields] for i in range(width)]
     comma, settled = _comma_of(bare)

@@ -107,14 +107,12 @@ _SPELLINGS |= {
 COUNTS = {"count", "ct", "cnt", "qc", "inc", "incr", "inkr", "increment", "pulse", "tick", "lu", "puu", "step"}
 """Spellings of an encoder's count where a unit is stated, without a plural's s; its length must be given."""
 
-_SUFFIXES = {
-    "mm", "cm", "um", "nm", "inch", "inches", "meter", "rad", "mrad", "urad", "deg", "mdeg", "arcmin", "arcsec", "s",
-    "ms", "us", "ns", "counts", "ticks",
-}  # fmt: skip
+_SUFFIXES = {"mm", "cm", "um", "nm", "inch", "inches", "meter", "rad", "mrad", "urad", "deg", "mdeg", "arcmin"}
+_SUFFIXES |= {"arcsec", "s", "ms", "us", "ns", "counts", "ticks"}
 """Units that end a name after an underscore or a comma; m is none, as ``x_m`` is rather the measured position."""
 
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
-_INSIDE = re.compile(r"\s*[\[(](?P<unit>[^\[\]()]+)[\])]\s*")
+_INSIDE = re.compile(r"\s*\((?P<unit>[^()]+)\)\s+")
 _SLASH = re.compile(r"^(?P<name>.*?\S)\s*(?:/|\bin\b)\s*(?P<unit>\S+)\s*$")
 _MULTIPLE = re.compile(r"^\s*(?P<times>\d*\.?\d+(?:[eE][+-]?\d+)?)\s*(?P<unit>\S+)\s*$")
 _SUFFIX = re.compile(r"^(?P<name>.*?[^_\s,])(?:_|\s*,\s*)(?P<unit>[^_\s,]+)$")
@@ -133,7 +131,11 @@ def position_unit(text: str, known_units: Mapping[str, Unit] = POSITION_UNITS) -
         return unit
     unit, times = known_units.get(plain_name(multiple["unit"])), float(multiple["times"])
     known = unit is not None and 0.0 < times * unit.factor < math.inf
-    return Unit(f"{times:g} {unit.name}", unit.si, times * unit.factor) if unit is not None and known else None
+    return (
+        Unit(f"{times!r} {unit.name}".replace(".0 ", " "), unit.si, times * unit.factor)
+        if unit is not None and known
+        else None
+    )
 
 
 def si_factor(own: str) -> Callable[[str], float]:
@@ -177,7 +179,8 @@ def stated_unit(name: str) -> tuple[str, str]:
     if suffix and ({plain_name(suffix["unit"]), suffix["unit"].lower()} & _SUFFIXES):
         return suffix["name"], suffix["unit"]
     inside = _INSIDE.search(name)
-    return (_INSIDE.sub(" ", name, 1), inside["unit"]) if inside and _is_unit(inside["unit"]) else (name, "")
+    is_position = inside is not None and time_unit(inside["unit"]) is None and _is_unit(inside["unit"])
+    return (_INSIDE.sub(" ", name, 1), inside["unit"]) if inside and is_position else (name, "")
 
 
 def _is_unit(text: str) -> bool:

@@ -270,6 +270,9 @@ def test_an_errors_name_chooses_the_axis(there: str) -> None:
     table = {**dict(zip(there.split(), of, strict=False)), "X_err|1": x_d - x, "Y_err|2": 0.5 * (x_d - x)}
     log = read_log(table, T_s=1e-3, columns={"error": "Y_err|2"})
     np.testing.assert_allclose((log.x_d, log.x_meas), of[2:], atol=1e-15)
+    for own in ({"x_d": x_d, "X1_act": x, "x": x}, {"soll": x_d, "X1_act": 2.0 * x}):  # names of no axis come first
+        log = read_log({**own, "X1_err": x_d - x}, T_s=1e-3, columns={"error": "X1_err"})
+        np.testing.assert_allclose((log.x_d, log.x_meas), of[:2], atol=1e-15)
     with pytest.raises(LogError, match=r"column 'Y_lag' \(error\) is missing, .*; name it: --error NAME"):
         read_log(table, T_s=1e-3, columns={"error": "Y_lag"})
 

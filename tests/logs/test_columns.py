@@ -14,6 +14,7 @@ from hybridsep.base.errors import LogError, first_line, listed
 from hybridsep.logs.columns import channels
 from hybridsep.logs.formats import open_source
 from hybridsep.logs.log import read_log
+from hybridsep.logs.units import position_unit
 
 
 @pytest.mark.parametrize(
@@ -93,18 +94,13 @@ def test_units_that_are_none(tmp_path: Path, unit: Any) -> None:
 
 @pytest.mark.parametrize(
     ("unit", "factor", "si"),
-    [
-        ("cm", 1e-2, "m"),
-        ("nm", 1e-9, "m"),
-        ("mils", 2.54e-5, "m"),
-        ("arcsec", np.pi / 648e3, "rad"),
-        ("rev", 2 * np.pi, "rad"),
-    ],
+    [("cm", 1e-2, "m"), ("mils", 2.54e-5, "m"), ("arcsec", np.pi / 648e3, "rad"), ("rev", 2 * np.pi, "rad")],
 )
 def test_units(tmp_path: Path, unit: str, factor: float, si: str) -> None:
     log = read_log(write_csv(tmp_path / "log.csv", f"t,x_d ({unit}),x [{unit}]\n0,1,2\n1,3,4\n"))
     np.testing.assert_allclose(log.x_meas, [2 * factor, 4 * factor], rtol=1e-15)
     assert (log.unit, log.unit_stated) == (si, True)
+    assert position_unit(log.file_unit) == position_unit(unit)
 
 
 def test_an_index_is_told_from_time(tmp_path: Path) -> None:
@@ -112,7 +108,8 @@ def test_an_index_is_told_from_time(tmp_path: Path) -> None:
     path = write_csv(tmp_path / "log.csv", "t,x_d,x\n" + rows)
     message = r"column 't' counts samples: it is an index, or a time in ms; give T_s \(--T_s 0.001\), or .*'t \[ms\]'"
     refused(message, path)
-    refused(r"us \[us\]", write_csv(tmp_path / "us.csv", "us,x_d,x\n" + rows), columns={"t": "us"})
+    named = write_csv(tmp_path / "us.csv", "# us,a,b\n# ----\n" + rows)
+    refused(r"us \[us\]", named, columns={"t": "us", "x_d": "a", "x": "b"})
     log = read_log(path, T_s=2e-3)
     np.testing.assert_allclose(log.t, 2e-3 * np.arange(20))
     assert read_log(write_csv(path, "t [ms],x_d,x\n" + rows)).T_s == 1e-3

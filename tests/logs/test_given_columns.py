@@ -215,7 +215,7 @@ OF_TOOLS = (
     "target_q_{} | actual_q_{} | target_qd_{} | actual_qd_{} @ 3; q_cmd[{}] | q_act[{}] @ 3; x_d[{}] | x[{}] @ 3; "
     "desired.positions[{}] | actual.positions[{}] | desired.velocities[{}] @ 3; set_point | process_value; "
     "/arm/state/reference/positions[{}] | /arm/state/feedback/positions[{}] @ 3; ref | fb | control; "
-    "ctrl_pos|{} | enc_pos|{} | des_pos|{} @ 3; "
+    "ctrl_pos|{} | enc_pos|{} | des_pos|{} @ 3; cmd | pos | action | observation; "
     "Axis_{}.Position | Axis_{}.ActualPosition | Axis_{}.Velocity | Axis_{}.ActualVelocity @ 3; "
     "/joint_commands/a{}/position | /joint_states/a{}/position @ a3; RPOS({}) | FPOS({}) | PE({}) @ 1; "
     "s noml X [mm] | s actual X [mm] | s diff X [mm] | v noml X [mm/min]; PCMD(X)[mm] | POSF(X)[mm] | VCMD(X)[rpm]; "
@@ -254,7 +254,8 @@ def test_names_of_robots_and_controllers(one: str) -> None:
 
 
 def test_ticks_need_no_unit_where_the_interval_is_given() -> None:
-    assert read_log({"time_ticks": 1e4 * np.arange(len(X)), "x_d": X_D, "x": X}, T_s=1e-3).T_s == 1e-3
+    for names in (("time_ticks",), ("cmd/t", "act/t")):
+        assert read_log({**dict.fromkeys(names, 1e4 * np.arange(N)), "x_d": X_D, "x": X}, T_s=1e-3).T_s == 1e-3
 
 
 def test_units_of_names() -> None:
@@ -262,7 +263,7 @@ def test_units_of_names() -> None:
     assert stated_unit("Position (mm) set") == ("Position set", "mm")
     assert [stated_unit(f"x ({unit})")[1] for unit in ("0.1um", "counts", "X", "V")] == ["0.1um", "counts", "", ""]
     assert stated_unit("t_milliseconds") == stated_unit("t [milliseconds]") == ("t", "milliseconds")
-    for name in ("Boom Ms", "Boom ms", "Room in", "q[0]", "q(1)", "x_m"):
+    for name in ("Boom Ms", "Room in", "q[0]", "q(1)", "x_m", "io[in].x_d", "y[m].pos", "Pos(s) set", "s (min) 1"):
         assert stated_unit(name) == (name, "")
 
 
