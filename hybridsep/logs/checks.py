@@ -82,13 +82,8 @@ class Finding:
 def findings_table(findings: Iterable[Finding]) -> list[dict[str, Any]]:
     """Return findings as plain data, for JSON."""
     return [
-        {
-            "name": one.name,
-            "severity": "error" if one.refused else "note",
-            "words": one.words,
-            "evidence": dict(one.evidence),
-            "options": [option for option, _ in one.options],
-        }
+        {"name": one.name, "severity": "error" if one.refused else "note", "words": one.words}
+        | {"evidence": dict(one.evidence), "options": [option for option, _ in one.options]}
         for one in findings
     ]
 
@@ -480,8 +475,7 @@ def _note_held(log: Log, lag: int) -> Iterator[Finding]:
             f"the measured position stands {n} time{'s' if n > 1 else ''} while the command goes on, longest from "
             f"sample {first + 1} for {last - first} samples, {moved[longest]:.2g} of the travel: {why}"
         )
-        evidence = {"n": float(n), "n_samples": float(last - first), "moved": float(moved[longest])}
-        yield Finding(name, words, evidence)
+        yield Finding(name, words, {"n": float(n), "n_samples": float(last - first), "moved": float(moved[longest])})
 
 
 def _travel(x: Array) -> float:

@@ -301,8 +301,7 @@ def channels(source: Source) -> list[_Channel]:
         roles.update((name, what) for what, name in signals_of(source.names, pair["x"] or "").items())
         roles.update((name, role) for role, name in pair.items())
     with suppress(LogError):
-        x_d = next((name for name, role in roles.items() if role == "x_d"), None)
-        known = _time_of(source, x_d or "")
+        known = _time_of(source, next((name for name, role in roles.items() if name and role == "x_d"), ""))
         roles[_only_time(source) if known is None else known] = "t"
     units = {**source.assumed_units, **source.units}
     return [_Channel(name, units.get(name) or stated_unit(name)[1], roles.get(name, "")) for name in source.names]

@@ -46,7 +46,7 @@ _VELOCITY = {"vel", "velo", "velocity", "velocities", "speed", "speeds", "geschw
 _ERROR = {"error", "err", "errors", "diff", "posdiff", "deviation", "droop", "schleppfehler", "schleppabstand"}
 _ERROR |= {"fe", "ferr", "ferror", "poserr"}
 # of a whole move or of another instant; ACS has DPOS beside RPOS
-_LATER = re.compile("target|goal|action|planned|nominal|(?<![a-z])[dmt]pos(?![a-z])", re.IGNORECASE)
+_LATER = re.compile("target|goal|planned|nominal|(?<![a-z])([dmt]pos|action)(?![a-z])", re.IGNORECASE)
 _NO_POSITION = _VELOCITY | _ERROR | {"acc", "acceleration", "accelerations", "jerk", "torque", "frequency"}
 _TIME = {"time", "timestamp", "zeit", "zeitstempel", "temps"}
 """Words within names, in small letters; what is left of a name beside those of positions and what fills is the axis."""

@@ -162,8 +162,7 @@ class CaptureSource(GivenSource):
             columns[_TIME] = 1e-3 * cycle * (columns[_COUNTER] - columns[_COUNTER][:1])
         super().__init__(path, columns)
         self.axes = {axes[x_d]: (x_d, x) for x_d, x in axes_of(names).values()}
-        moving = [axis for axis, (x_d, _) in self.axes.items() if np.ptp(columns[x_d]) != 0.0]
-        self.axis = moving[0] if moving else ""
+        self.axis = next((axis for axis, (x_d, _) in self.axes.items() if np.ptp(columns[x_d]) != 0.0), "")
         self.assumed_units = {
             name: "deg" if axis.upper().startswith(("A", "B", "C", "S")) else "mm"  # of rotary axes and spindles
             for name, axis in axes.items()

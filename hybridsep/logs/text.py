@@ -383,11 +383,10 @@ def _find_table(lines: Sequence[tuple[int, str]]) -> _Table | None:
 
 def _width(fields: Sequence[str]) -> int:
     """Return the number of fields of a row of numbers, 0 if more than half of them are neither that nor missing."""
-    others = [text for text in fields if text and not (_is_written(text) or _MISSING.fullmatch(text))]
-    n = sum(map(_is_written, fields))
-    texts = [text for text in others if not stamp_kind(text)]
-    of_units = sum(map(bool, map(_WITH_UNIT.match, texts)))  # numbers, but for a preamble's: Rate, 1000 Hz
-    return len(fields) if (n and n >= len(texts)) or 0 < of_units == len(texts) else 0
+    n, others = sum(map(_is_written, fields)), [text for text in fields if text and not _is_written(text)]
+    texts = [text for text in others if not (_MISSING.fullmatch(text) or stamp_kind(text))]
+    # Numbers with units count as well, but not beside other text, as in a preamble: Rate,1000 Hz
+    return len(fields) if (n and n >= len(texts)) or (texts and all(map(_WITH_UNIT.match, texts))) else 0
 
 
 def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int, mark: str | None) -> _Table | None:

@@ -119,17 +119,16 @@ class TwinCatSource(ArraysSource):
     def _field(self, field: int, name: str) -> Array:
         """Return a field of all lines down to the last one that has it."""
         is_time = field in {time for _, time in self._places.values()}
-        counted = is_time and self._counted
+        kind = np.int64 if is_time and self._counted else np.float64
         rows = ((i, line.split(self._mark)) for i, line in reversed(list(enumerate(self._lines, start=1))))
         end = next((i for i, row in rows if _cell(row, field)), 0)
         try:
-            kind, mark = np.int64 if counted else np.float64, self._mark
-            values = np.loadtxt(self._lines[:end], kind, delimiter=mark, usecols=field, comments=None, ndmin=1)
+            values = np.loadtxt(self._lines[:end], kind, delimiter=self._mark, usecols=field, comments=None, ndmin=1)
         except (ValueError, OverflowError) as error:
             raise LogError(
                 f"{self.path}, below line {self._first - 1}: column {brief(name)} must be numbers: {first_line(error)}"
             ) from error
-        if counted:
+        if kind is np.int64:
             return np.asarray((values - self._origin) * _COUNT, dtype=np.float64)
         return np.asarray(values * _MS if is_time else values, dtype=np.float64)
 

@@ -167,8 +167,7 @@ def test_nulls_times_structs_and_decimals(tmp_path: Path) -> None:
 
 
 def test_units_in_the_metadata_of_fields(tmp_path: Path) -> None:
-    fields = [pa.field(name, pa.float64(), metadata={"unit": "mm"}) for name in ("x_d", "x")]
-    fields += [pa.field("q", pa.float64())] * 2  # of one name
+    fields = [pa.field(name, pa.float64(), metadata={"unit": "mm"}) for name in ("x_d", "x", "q", "q")]
     pq.write_table(pa.table([X_D, X, X, X_D], schema=pa.schema(fields)), tmp_path / "log")
     assert read_log(tmp_path / "log", T_s=1e-3).file_unit == "mm"
 
