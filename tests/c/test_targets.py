@@ -1,8 +1,7 @@
 """The C library on processors of controllers, emulated without an operating system, and in WebAssembly.
 
-Libraries of mathematics differ in the last bit. What is compared to the bit has the same exp, pow, tanh, sin and cos on
-both machines (benchmarks/targets/plain_math.c); with each one's own, predictions differ by less than what the library
-and the C core may.
+Libraries of mathematics differ in the last bit: what is compared to the bit has the same exp, pow, tanh, sin and cos
+on both machines (benchmarks/targets/plain_math.c).
 """
 
 import sys

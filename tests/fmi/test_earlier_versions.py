@@ -1,7 +1,6 @@
 """States and weights that each version has written: this one goes on from them, or refuses with what to do.
 
-`python tests/fmi/test_earlier_versions.py` writes those of this version, when it is released. Where a format changes,
-the expected outcome of the earlier files becomes the refusal.
+`python tests/fmi/test_earlier_versions.py` writes this version's. Where a format changes, refusal is the outcome.
 """
 
 from pathlib import Path

@@ -1,7 +1,6 @@
 """Binaries for other platforms against x86-64 Linux, under Wine, qemu and musl's loader; of nights and releases.
 
-Each FMU's reference run is played by tests/c/host.c; FMUs and host are compiled by the ``ziglang`` wheel. Where musl is
-the C library, as on Alpine, the library is the one for glibc: musl's loader takes its place.
+Each FMU's reference run is played by tests/c/host.c. musl's loader takes the library for glibc, as on Alpine.
 """
 
 import os

@@ -1,7 +1,6 @@
 """Sources for Beckhoff's TwinCAT: the configuration file, and C as Microsoft's compiler takes it.
 
-Neither that compiler nor TE1420 is at hand. Clang, in the ziglang wheel, compiles for its system with headers that
-declare what a source FMU needs and nothing more (tests/c/msvc).
+Neither that compiler nor TE1420 is at hand: Clang compiles for its system with only the headers in tests/c/msvc.
 """
 
 from pathlib import Path

@@ -1,7 +1,6 @@
 """The HAL component in a running LinuxCNC, on simulated drives; ``hybridsep hal`` without it.
 
-The tests in a running LinuxCNC run at night: they need its package with the headers, root to install the component, and
-an ordinary user that LinuxCNC runs as.
+Those in a running LinuxCNC, at night, need its package with the headers, root, and an ordinary user that it runs as.
 """
 
 import fcntl

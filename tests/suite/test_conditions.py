@@ -1,7 +1,6 @@
 """Late and missing measurements, starts in motion, faster motion and plants that have changed, in every implementation.
 
-Every implementation shows what the library shows: within 1e-12 m with averaging, 1e-11 m with the paper's model. That
-what it shows is good is tested in tests/predict.
+Every implementation shows what the library shows: within 1e-12 m with averaging, 1e-11 m with the paper's model.
 """
 
 from copy import copy

@@ -200,10 +200,9 @@ class Library:
 
 
 class Library3(Library):
-    """Functions of FMI 3.0; those for states can be called by FMI 2.0's names as well.
+    """Functions of FMI 3.0; those for states can be called by FMI 2.0's names as well."""
 
-    Blocks of memory are counted where the library counts them (tests/c/counted.h).
-    """
+    # Blocks of memory are counted where the library counts them (tests/c/counted.h)
 
     version, slave = 3, fmi3.FMU3Slave
     values: ClassVar[dict[str, Any]] = {

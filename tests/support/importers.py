@@ -1,8 +1,7 @@
 """A closed system as a file, ReferenceTrajectory → a look-ahead FMU → FeedDrive, in other projects' importers.
 
-Run as a program, so that an importer's threads and libraries live in a process of their own:
-``python tests/support/importers.py IMPORTER SYSTEM ARCHIVE N OUT`` runs the archive for N steps, and writes what is
-observed after each, ``(N, n_observed)``, to OUT.
+A process of its own, ``python tests/support/importers.py IMPORTER SYSTEM ARCHIVE N OUT``, runs the archive for N steps,
+and writes what is observed after each, ``(N, n_observed)``, to OUT.
 """
 
 import ctypes

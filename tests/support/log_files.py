@@ -40,11 +40,9 @@ def halscope_csv(data: Mapping[str, Any], period_ns: int = 1_000_000) -> str:
 
 
 def trace_xml(signals: Mapping[str, tuple[float, float, Array]], kind: str = "posn") -> str:
-    """Return a trace of SINUMERIK Operate.
-
-    Signals are first time, interval and samples by name, ``nckServoDataCmdPos2ndEnc64 [u1, 7]``. Values that are as
-    before are left out, and records without any.
-    """
+    """Return a trace of SINUMERIK Operate."""
+    # Signals are first time, interval and samples by name, nckServoDataCmdPos2ndEnc64 [u1, 7]. Values that are as
+    # before are left out, and records without any
     declared, changes = [], dict[float, dict[str, float]]()
     for i, (name, (start, interval, values)) in enumerate(signals.items(), 1):
         declared.append(

@@ -1,7 +1,6 @@
 """mypy plugin: kinds of errors that NumPy before 2.3, the last for Python 3.10, gives where there is no fault.
 
-Its stubs have other types of arrays and scalars than those that this code is checked with, whose differences show as
-errors of these kinds. With a newer NumPy, as on any newer Python, they are checked as all others.
+Its stubs have other types of arrays and scalars. With a newer NumPy, as on any newer Python, they are checked.
 """
 
 from importlib.metadata import version

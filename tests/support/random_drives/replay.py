@@ -48,11 +48,9 @@ def core_replay(predictor: str, model: ModalModel, settings: PredictorSettings, 
 def core_outputs(
     predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array, names: Sequence[str]
 ) -> Array:
-    """Return outputs of the C core's predictor, ``(len(names), n)``, m.
-
-    A last window that is cut off is predicted as part of a whole one, beyond whose end the command rests; the library
-    predicts it alone.
-    """
+    """Return outputs of the C core's predictor, ``(len(names), n)``, m."""
+    # A last window that is cut off is predicted as part of a whole one, beyond whose end the command rests; the library
+    # predicts it alone
     used = PREDICTORS[predictor](settings)
     Np, n, modes = used.Np, len(x_d), model.modes
     name = f"predictor of {len(modes)} modes"

@@ -93,11 +93,9 @@ def _motion(models: Sequence[ModalModel], values: dict[str, Array], u: Array) ->
 
 
 def _tables(model: ModalModel, h: float) -> tuple[Array, Array, Array, Array]:
-    """Return the exact step by ``h``, s, of each mode, and its outputs.
-
-    Returns ``A``, (2, 2, 4); ``B``, (2, 4); ``command``, (2, 4): output weights of the response to the command;
-    ``force``, (2, 4): of that to a force at the tool: every mode in phase, without zeros, static gain 1.
-    """
+    """Return the exact step by ``h``, s, of each mode, and its outputs."""
+    # Returns A, (2, 2, 4); B, (2, 4); command, (2, 4): output weights of the response to the command;
+    # force, (2, 4): of that to a force at the tool: every mode in phase, without zeros, static gain 1
     A, b, c = model.state_space()
     step, gain = np.zeros((2, 2, MODES_MAX)), np.zeros((2, MODES_MAX))
     command, force = np.zeros((2, MODES_MAX)), np.zeros((2, MODES_MAX))
@@ -113,11 +111,10 @@ def _tables(model: ModalModel, h: float) -> tuple[Array, Array, Array, Array]:
 
 
 class _Offsets:
-    """Friction, cubic stiffness and cogging as an offset of the command, ``(m,)``, m, in steps.
+    """Friction, cubic stiffness and cogging as an offset of the command, ``(m,)``, m, in steps."""
 
-    Each is taken half a step ahead of the position, which is the mean over the step that it is held for: a stiffness
-    held from the position before would act as negative damping.
-    """
+    # Each is taken half a step ahead of the position, which is the mean over the step that it is held for: a stiffness
+    # held from the position before would act as negative damping
 
     def __init__(self, values: dict[str, Array]) -> None:
         self.v = values

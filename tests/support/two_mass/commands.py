@@ -1,7 +1,6 @@
 """Random commands of an axis as an interpolator makes them, at any sampling interval.
 
-Where an axis moves from point to point, its velocity is piecewise constant and filtered by two moving averages, which
-bound acceleration and jerk (as controls of machine tools do).
+From point to point the velocity is piecewise constant, filtered by two moving averages, as controls do it.
 """
 
 from collections.abc import Callable
