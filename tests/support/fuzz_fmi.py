@@ -1,7 +1,7 @@
 """Random calls of an FMU's functions of FMI 2.0 or 3.0, and tables that were changed.
 
 Run as a program: ``python tests/support/fuzz_fmi.py FOLDER --seconds 600 --seed 1``, with unpacked FMUs, best ones
-whose library has sanitizers and counts its blocks (``-include tests/c/counted.h``). Findings: a crash, a refusal without
+with sanitizers and counted blocks (``-include tests/c/counted.h``). Findings: a crash, a refusal without
 a message, a refused step that changed a value, a damaged table that was taken, memory that was not given back.
 """
 

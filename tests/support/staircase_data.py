@@ -1,7 +1,6 @@
 """The staircase experiment of the paper, made independently of the library's own plant and trajectory.
 
-Six 10 mm moves, one at the start of each second, three up and three down, on the nonlinear drive ``m ẍ + c ẋ + k x +
-c_nl ẋ|ẋ| + k_nl x|x| = c ẋ_d + k x_d`` with ``x_d`` held over each millisecond.
+Six 10 mm moves, three up, three down, on ``m ẍ + c ẋ + k x + c_nl ẋ|ẋ| + k_nl x|x| = c ẋ_d + k x_d``, held for 1 ms.
 """
 
 from functools import lru_cache
