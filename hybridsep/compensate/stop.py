@@ -16,8 +16,8 @@ from .limits import ROUNDING, DriveBounds
 from .splines import N_DECIDED, SplineBasis
 
 _TRIES = 12
-"""Lengths of the way from the last stop to a plan that are tried, all of it first, to a two-thousandth: where none of a
-few larger ones has a stop, an axis stands off (``docs/experiments/2026-11-29-stops-by-bisection.md``)."""
+"""Lengths of the way from the last stop to a plan that are tried, all of it first, to a two-thousandth: with only a few
+long ones, none of which had a stop, an axis stood off (``docs/experiments/2026-11-29-stops-by-bisection.md``)."""
 
 _STILL, _MOST = 1e-12, 10.0
 """Row of the last stop's own part, in limits, below which that part does not matter there; and largest share of it:

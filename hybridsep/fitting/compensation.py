@@ -215,7 +215,7 @@ class Tracking:
                     f"{unit}/s{power}: where they do, it bounds what the compensator adds; is it the drive's?"
                 )
         trips = (
-            "Where the measured following error, or its mean with the one behind the modified command, is above "
+            "Where the measured following error, or its geometric mean with that from the modified command, is above "
             f"following_error_max = {monitored} for three samples in a row, the compensator trips: the change fades."
             if monitored
             else "following_error_max is 0: nothing trips."

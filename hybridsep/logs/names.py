@@ -130,15 +130,13 @@ def axes_of(names: Sequence[str]) -> dict[str, tuple[str, str]]:
 
 
 def beside_error(names: Sequence[str], error: str = "") -> dict[str, str]:
-    """Return the positions by role of the axis whose words an error's name has, without a name of the only one."""
+    """Return the positions by role of the axis whose words an error's name has; without a name, of the only axis."""
     commanded, measured, _ = _by_words(names)
     words, both = _words(error), {axis: {"x_d": x_d, "x": x} for axis, (x_d, x) in axes_of(names).items()}
     alone = {axis: {"x": x} for axis, x in measured.items() if words or not commanded}
     alone |= {axis: {"x_d": x_d} for axis, x_d in commanded.items()}
-    if words and not {*known_names("x_d", names), *known_names("x", names)} <= {
-        *commanded.values(),
-        *measured.values(),
-    }:
+    of_axes = {*commanded.values(), *measured.values()}
+    if words and not {*known_names("x_d", names), *known_names("x", names)} <= of_axes:
         return {}  # names of no axis come first
     for known in (both, {} if words and "" in commanded else alone):
         own = {axis: _words(axis) for axis in known}

@@ -321,10 +321,11 @@ class Regression(Expert):
 
 @dataclass(frozen=True)
 class Recall(Expert):
-    """What was measured after the commands most like those ahead, and under a compensator were others for the drive.
+    """What was measured after the commands most like those ahead.
 
-    The physics model says what their difference makes. Where the command's expert answers more to what is fast, it is
-    believed instead: with less than the drive's own answer the same correction, pass by pass, would grow.
+    Under a compensator the drive got modified commands, then and now. The physics model tells what their difference
+    makes. Where the command's expert answers more to fast changes, it is believed instead: with less than the drive's
+    own answer the same correction would grow from pass to pass.
     """
 
     def before(self, static: StaticFeatures, n: int) -> int:
@@ -336,7 +337,7 @@ class Recall(Expert):
         if static.n_known is None or ARX_COMMAND not in solved:
             return 0.0
         one, u = solved[ARX_COMMAND], np.minimum(np.arange(1, n + 1) / PULSE, 1.0)
-        pulse = u * (1.0 - u) * u * (1.0 - u) * u * (1.0 - u)
+        pulse = (u * (1.0 - u)) * (u * (1.0 - u)) * (u * (1.0 - u))  # in the C core's order
         own, _ = static.discrete.forced_response(static.discrete.rest(), pulse)
         drive = lfilter(one.solution.weights[1 : one.n_static], [1.0], first_differences(pulse))
         e, _ = _recursion(one.lag_weights, drive, np.zeros(len(one.lag_weights)))
