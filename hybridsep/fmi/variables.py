@@ -39,7 +39,7 @@ _NO_MEASUREMENT = (
 )
 _STD = "standard deviation of x_meas - x_h, now; 0: not known"
 _ALARM = (
-    "whether it has tripped: for three samples x_meas - x_d, or its geometric mean with x_meas - x_dm, was over its limit"
+    "whether it tripped: for three samples x_meas - x_d, or its geometric mean with x_meas - x_dm, was over its limit"
 )
 # no input: several masters set all inputs by setReal
 _RESET = "a rising edge ends a trip; what was learned before it stays"
