@@ -196,7 +196,7 @@ def test_rows_may_come_while_a_solution_is_made(n: int, n_before: int, amounts: 
 @given(st.integers(1, 40), st.integers(0, 30), st.floats(-3.0, 1.0), st.integers(0, 9))
 @settings(max_examples=50, deadline=None)
 def test_the_last_row_may_tell_more_than_all_others(n: int, n_before: int, size: float, seed: int) -> None:
-    """Squares resolve it to 1e-10, but where a programme is badly conditioned, one in forty of what is drawn."""
+    """Squares resolve it to 1e-10, but where a programme is badly conditioned, one in forty."""
     gram, library, rows, _ = both(n, n_before + 1, seed)
     penalties = 10.0 ** np.random.default_rng(seed).uniform(-3, 3, n) * np.abs(rows).max(axis=0) ** 2
     last = 10.0**size * np.random.default_rng(seed).normal(size=n + 1) * np.abs(np.append(rows[-1], 1.0))
