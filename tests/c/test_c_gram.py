@@ -59,8 +59,8 @@ class CGram:
 class CSolution:
     """Weights of the first features with penalties, as hsep_experts.c solves for them: the tail's are backwards.
 
-    ``gram``: its rows, settled; ``penalties``, (m,): of its first ``m`` features; where these are all, their second half
-    is the head; ``other``: rows that are added with a ``weight``, settled; ``later``, (k, m + 1): rows ``[φ | target]``
+    ``gram``: its rows, settled; ``penalties``, (m,): of its first ``m`` features; of all, their second half is
+    the head; ``other``: rows that are added with a ``weight``, settled; ``later``, (k, m + 1): rows ``[φ | target]``
     that come once it has begun; ``amounts``: multiply-adds before each of them; what is left is done in the end.
     """
 
