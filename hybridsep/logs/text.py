@@ -26,7 +26,7 @@ from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .names import n_known
 from .source import Block, Source, past_midnights
-from .units import COUNTS, plain_name, position_unit, time_unit
+from .units import COUNTS, POSITION_UNITS, plain_name, position_unit, time_unit
 
 _BLOCK = 10_000  # lines that are converted at once
 
@@ -37,8 +37,8 @@ _UNIT_ROW = re.compile("units?|einheit(en)?|y_unit_label|trace_unit", re.IGNOREC
 _HEAD = 4  # rows above the numbers of which one has the names: units and descriptions may be below it
 _FACTOR = re.compile(r"[x*×/]\s*[.,\d]")  # begins a cell of a row of factors, which no reader may pass over
 _WITH_UNIT = re.compile(r"^([+-]?[\d.,]+(?:e[+-]?\d+)?)\s+([a-zµ]+)$", re.IGNORECASE)  # 0.001 sec, as of MATLAB
-_NO_UNITS = ("", "-", "1", "[-]", "none", "bool", "raw")  # entries of a row of units where a column has none
-_OTHERS = re.compile(r"[km]?[AVW]|k?N|%|rpm|min-1|[km]?Hz|°C|K|Grad")  # units of what is no length, angle or time
+_NO_UNITS = ("", "-", "1", "[-]")  # entries of a row of units where a column has none
+_POSITIONS = {*POSITION_UNITS, *COUNTS, "grad"} - {"m", "in"}  # two of these, or of another, make a row of units
 _BLANK = -math.inf  # stands for a blank cell of the command until it is filled
 _APART = 0.9  # share of rows with one of the two positions from which on channels have times of their own
 
@@ -413,12 +413,14 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
             break
     if not above:
         return None
-    of_units = [_is_row_of_units([a for a, b in zip(row, kinds, strict=False) if not b]) for _, row in above]
+    cells = [[a for a, b in zip(row, kinds, strict=False) if not b] for _, row in above]
+    of_units = [_is_row_of_units(row) and n_known(row) < 2 for row in cells]
     factors = (i + 1 for i, (_, row) in enumerate(above) if any(map(_FACTOR.match, row)))  # nothing above is looked at
     near = [i for i, is_units in enumerate(of_units[: min(_HEAD, next(factors, _HEAD))]) if not is_units] or [0]
     at = max(near, key=lambda i: (n_known(above[i][1]), -i))  # the one with more known names counts, else the nearest
     header, names = above[at]
-    beside = (row for i, (_, row) in enumerate(above[: at + 2]) if of_units[i] and i != at)  # below, or the line above
+    over = [i for i, (_, row) in enumerate(above) if i == at + 1 and not re.search(r"\d", "".join(row))]  # the names
+    beside = (above[i][1] for i in [*range(at), *over] if of_units[i] and not _UNIT_ROW.fullmatch(above[i][1][0]))
     keyed = (row for _, row in above[:9] if row is not names and _UNIT_ROW.fullmatch(row[0]))
     units = dict(zip(names, next(beside, ["", *next(keyed, [""])[1:]]), strict=False))
     behind = [[(_WITH_UNIT.match(row[i]) or ("",) * 3)[2] for row in fields[:9] if row[i]] for i in range(len(names))]
@@ -489,7 +491,8 @@ def _names(line: str, delimiter: str | None) -> list[str]:
 
 
 def _is_row_of_units(fields: Sequence[str]) -> bool:
-    texts = [field.strip("[]()").strip() for field in fields]
-    known = [bool(position_unit(text) or time_unit(text) or "/" in text) for text in texts]
-    blank = [plain_name(a) in _NO_UNITS or plain_name(a).rstrip("s") in COUNTS or _OTHERS.fullmatch(a) for a in texts]
-    return any(known) and all(a or b for a, b in zip(known, blank, strict=True))
+    """Return whether fields are units, or two of them are units of positions, whatever is beside them."""
+    plain = [plain_name(field.strip("[]()")) for field in fields]
+    known = [bool(position_unit(one) or time_unit(one) or "/" in one) for one in plain]
+    n = [plain.count("m"), plain.count("in"), sum(one in _POSITIONS or one.rstrip("s") in _POSITIONS for one in plain)]
+    return max(n) > 1 or (any(known) and all(a or b in _NO_UNITS for a, b in zip(known, plain, strict=True)))

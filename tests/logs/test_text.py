@@ -67,6 +67,9 @@ TWO_ROWS = "0,1,2\n1,3,4\n"
         # Units of other quantities beside them, above the names, or after a blank
         "Time;x_d;x;I;M;v;on\nms;mm;mm;A;%;rpm;BOOL\n0;1000;2000;5;5;5;1\n1000;3000;4000;5;5;5;1\n",
         "s,mm,mm,°C\nt,cmd,act,T\n0,1000,2000,5\n1,3000,4000,5\n",
+        "run,5,a,b,c\nt,x_d,x,step,count\n0,1,2,5,5\n1,3,4,5,5\n",
+        "Unit,mm,mm\nTime[ms],PCMD(X),POSF(X)\n0,1000,2000\n1000,3000,4000\n",
+        ";5 mm;5 mm\nt;x_d;x\n0;1;2\n1;3;4\n",
         "Time ms;Pos cmd mm;Pos [mm] act\n0;1000;2000\n1000;3000;4000\n",
     ],
 )
