@@ -157,8 +157,10 @@ FINDINGS: Mapping[str, Explanation] = {
         "Look at the positions in the report. Record with a larger range where it was the recorder.",
     ),
     "late": Explanation(
-        "The measured position lags its command by more than 0.1 s in all: drive, dead time and recorder.",
-        "None, if the axis is as slow. Where the recorder is known to be late by whole samples, give `--delay`; where "
+        "The measured position lags its command by more than 0.1 s in all: drive, dead time and recorder. It is "
+        "refused where it is above 1 s, nothing states the unit of the times, and read in s no axis is as slow.",
+        "None, if the axis is as slow. Times in ms: `--T_s`, or `t [ms]` in the file. Where the recorder is known to "
+        "be late by whole samples, give `--delay`; where "
         "the controller gets the measurement as late, `--measurement_delay`.",
     ),
     "offset": Explanation(

@@ -55,6 +55,13 @@ function passes_1000(rows, j) {
   return grouped < decimal;
 }
 
+/** Whether points are between thousands in one of the columns, as in German, where nothing has a comma. */
+function points_divide(rows, n) {
+  const dotted = rows.map((row) => row.map((cell) => cell.replaceAll(".", ",")));
+  return !rows.flat().some((cell) => cell.includes(",")) && [...Array(n).keys()].some((j) =>
+    dotted.every((row) => !row[j]?.includes(",") || THOUSANDS.test(row[j])) && passes_1000(dotted, j));
+}
+
 /** Names, units and rows of texts of a CSV; what a comma in a number stands for, null where it is an error. */
 function parse(text) {
   const lines = text.replace(/^\ufeff/, "").split(/\r?\n/).filter((line) => line.trim() && !/^\s*(#|%|\/\/|!)/.test(line));
@@ -66,6 +73,7 @@ function parse(text) {
   const has_units = below.some(factor_of) && below.every((cell) => factor_of(cell) || ["", "-", "1"].includes(cell));
   const rows = cells.slice(has_units ? 2 : 1), written = rows.flat().filter((cell) =>
     cell && (isFinite(cell.replace(",", ".")) || THOUSANDS.test(cell)));
+  if (points_divide(rows, cells[0].length)) throw new LogError("write numbers without separators of thousands");
   const commas = written.filter((cell) => cell.includes(",")), points = written.some((cell) => cell.includes("."));
   const thousands = commas.length && commas.every((cell) => THOUSANDS.test(cell)) &&
     (points || commas.some((cell) => cell.split(",").length > 2) || cells[0].some((_, j) => passes_1000(rows, j)));
@@ -76,7 +84,7 @@ function parse(text) {
 const spelled = (text) => (one => SPELLINGS[one] ?? one)(text.trim().toLowerCase().replace(/[µμ]/g, "u"));
 const factor_of = (text) => UNITS[spelled(text)]?.[0] ?? TIMES[spelled(text)];
 
-/** A name without its unit, and the unit as it is written: x [mm], x (mm), x / mm, x in mm, x, mm or x_mm. */
+/** A name without its unit, and the unit as it is written: x [mm], x (mm), x / mm, x in mm, x, mm, x_mm or x mm. */
 function stated(name) {
   const brackets = /^(.*?)\s*(?:\[([^[\]]*)\]|\(([^()]*)\))\s*$/.exec(name);
   if (brackets) {
@@ -87,7 +95,7 @@ function stated(name) {
   }
   const slash = /^(.*?\S)\s*(?:\/|\bin\b)\s*(\S+)\s*$/.exec(name);
   if (slash && factor_of(slash[2])) return slash.slice(1);
-  const suffix = /^(.*?[^_\s,])(?:_|\s*,\s*)([^_\s,]+)$/.exec(name);
+  const suffix = /^(.*?[^_\s,])(?:_|\s*,\s*|\s+(?=[a-zµμ]{2,}$))([^_\s,]+)$/.exec(name);
   return suffix && SUFFIXES.includes(spelled(suffix[2])) ? suffix.slice(1) : [name, ""];
 }
 const plain = (name) => stated(name)[0].trim().toLowerCase().replace(/[\s.-]/g, "_");

@@ -153,8 +153,7 @@ def _two_axes(
         )
     inputs = {"path": path, **{f"machine file {axis}": machine_path(axis) for axis in axes}}
     check_outputs((("--out", out, RUNS), ("--figure", figure, (".png",))), inputs, force=force)
-    limits = Limits(*map(min, *map(_path_limits, machines)))
-    meant = read_path(path, limits, machines[0].T_s, unit)
+    meant = read_path(path, Limits(*map(min, *map(_path_limits, machines))), machines[0].T_s, unit)
     runs, steps = [], count()
     with tempfile.TemporaryDirectory() as temporary, progress_bar(as_json) as advance:
 

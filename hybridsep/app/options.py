@@ -143,8 +143,7 @@ def _in_the_place_of(
 
     @wraps(command)
     def run(**arguments: Any) -> None:
-        values = {one.name: arguments.pop(one.name) for one in taken}
-        command(**arguments, **{name: given(values)})
+        command(**{name: given({one.name: arguments.pop(one.name) for one in taken})}, **arguments)
 
     signature = inspect.signature(command, eval_str=True)
     mixed = [

@@ -259,8 +259,7 @@ class SepCompensator:
             nothing = np.zeros(compensator.predictor.Np)
             plan, stop = compensator._previous_plan, compensator._last_stop
             pending = PendingPlan(plan, nothing, nothing, stop, SepState.OFF, 1.0, plan, 0.0)
-            like = compensator._saved(), pending if meta["is_planned"] else ()
-            saved, found = restored(like, arrays)
+            saved, found = restored((compensator._saved(), pending if meta["is_planned"] else ()), arrays)
             for (owner, name), value in zip(compensator._owners(), saved, strict=True):
                 setattr(owner, name, value)
             compensator._pending = found or None

@@ -158,8 +158,7 @@ class PlanModel:
             if expert.like(self._model).target == COMMAND_RESIDUAL:
                 # As late as the command's expert takes them
                 acted = np.pad(changes, ((self._static.command.dead_time, 0), (0, 0)))[: len(changes)]
-                increments = first_differences(acted)
-                drive = lfilter(one.solution.weights[1 : one.n_static], [1.0], increments, axis=0)
+                drive = lfilter(one.solution.weights[1 : one.n_static], [1.0], first_differences(acted), axis=0)
                 total += (shrinkage + recalled) * _recur(one, drive) + (weight + recalled) * (acted - passed)
             else:
                 total += shrinkage * self._of_disturbances(one, slopes, changes, passed)

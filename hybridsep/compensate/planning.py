@@ -260,8 +260,7 @@ class AveragedPlanning(Planning):
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         super().__init__(basis, bounds, settings, Np)
         self.weight = basis.weight
-        few = self.n_pinned * self.spacing < TWICE
-        self.n_steps = 1 if few else 2 if THRICE * Np <= self.horizon else 3
+        self.n_steps = 1 if self.n_pinned * self.spacing < TWICE else 2 if THRICE * Np <= self.horizon else 3
         self.n_turning = self.horizon - (self.horizon // _STRAIGHT if self.n_steps > 2 else 0)
         # A plan that has faded as it had no stop may exceed limits where wide splines cannot leave it
         n = basis.n_free - self.n_pinned

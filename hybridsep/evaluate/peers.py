@@ -92,8 +92,7 @@ class ArxRun:
     def __init__(self, x_d: Array, x: Array, n: int, delay: int = 0) -> None:
         self.n = n
         self._delay = delay
-        late = np.concatenate((x[delay:], np.full(min(delay, len(x)), np.nan)))
-        self._y = late - x_d
+        self._y = np.concatenate((x[delay:], np.full(min(delay, len(x)), np.nan))) - x_d
         self._lagged, known = self._y.copy(), ~np.isnan(self._y)
         if 1 < known.sum() < len(known):  # between measured samples: lines double the error of an ARX
             between = Akima1DInterpolator(np.flatnonzero(known), self._y[known])

@@ -4,6 +4,7 @@ import errno
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -118,7 +119,7 @@ class Fit:
         It has at most ``Np`` commanded positions, in :attr:`unit`, as what is predicted; a quantity may have another.
         SignalError if there are more, or they cannot be used.
         """
-        factor, predictor = si_factor(self.unit), self.predictor()
+        factor, predictor = partial(si_factor, self.unit), self.predictor()
         command = as_samples(x_d, "x_d", factor=factor, T_s=predictor.T_s)
         if len(command) > predictor.Np:
             raise SignalError(f"x_d must have at most Np = {predictor.Np} samples, got {len(command)}")
@@ -165,7 +166,7 @@ class Fit:
                 report.table(head, rows, words=3)
         if fmus:
             sections.write_use(report, fmus[0], judged.T_s, judged.replay.Np, self.logs[0])
-            report.paragraph(f"{' and '.join(fmus)} start trained with the log.")
+            report.paragraph(f"{' and '.join(fmus)} start{'s' * (len(fmus) == 1)} trained with the log.")
         report.write(path)
 
     def build(

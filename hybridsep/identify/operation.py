@@ -79,9 +79,8 @@ def identify_operation(
         fit = fit_structure(segments, T_s, Structure(0), Delay(0), [], slowest=1.0)
         spread, rest = shown.words(moved), shown.words(fit.rms)
         findings.append(
-            f"{TOO_LITTLE} {part} to learn the dynamics from: the commanded position moves by {spread} "
-            f"(standard deviation), and {rest} of the measured one are not explained by it; a gain of 1 without lag is "
-            "taken"
+            f"{TOO_LITTLE} {part} to learn the dynamics from: the commanded position moves by {spread} (standard "
+            f"deviation), and {rest} of the measured one are not explained by it; a gain of 1 without lag is taken"
         )
     parameters, n_effective = estimates(fit, segments, T_s, unit)
     findings += _findings(fit, chosen, segments, parameters[0].std, n_effective, shown, part)

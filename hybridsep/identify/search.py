@@ -19,8 +19,7 @@ def fit_delay(segments: Sequence[Segment], T_s: float, structure: Structure, kno
     n = max(segment.stop for segment in segments)
     limit, slowest = int(2 * min(_DEAD_TIME_MAX / T_s, n / 4)), RATES_MIN / (T_s * n)
     cache: dict[int, Fit] = {}
-    rate = _bandwidth(segments, T_s, known)
-    starts = _starts(structure, known, T_s, rate)
+    starts = _starts(structure, known, T_s, _bandwidth(segments, T_s, known))
 
     def at(halves: int) -> Fit:
         if halves not in cache:

@@ -329,8 +329,7 @@ def _objection(fit: Fit, segments: Sequence[Segment], T_s: float) -> str:
         return "a pole slower than the recording shows"
     if structure.order > 2:
         fitted = [Segment(s.u[: s.stop], s.y[: s.stop], s.stop) for s in segments if s.known[: s.stop].sum() > 1]
-        at_once = structure.lag and fit.theta[-1] > -np.log(_AT_ONCE * T_s)
-        poles = "f_n" if at_once else ("f_n", "tau")
+        poles = "f_n" if structure.lag and fit.theta[-1] > -np.log(_AT_ONCE * T_s) else ("f_n", "tau")
         spreads = [e.std / e.value for e in estimates(fit, fitted, T_s)[0] if e.name.endswith(poles)]
         if max(spreads) > _SPREAD_MAX:
             return _UNCERTAIN[1]

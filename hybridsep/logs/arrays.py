@@ -1,7 +1,7 @@
 """Named arrays: in memory, or in files, NumPy's ``.npz``, MATLAB's ``.mat`` up to version 7, and Parquet."""
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 from ..base.errors import LogError, SignalError, brief, first_line
 from ..base.signals import Array, Given, check_same_index, given_column, index_values
 from .names import known_names
-from .source import ArraysSource, past_midnights
+from .source import ArraysSource, Block, past_midnights
 from .text import with_own_names
 from .units import TIME_UNITS
 
@@ -96,7 +96,9 @@ class TableSource(GivenSource):
             table = table.collect()
         super().__init__(path, _columns_of(table))
         if hasattr(type(table), "column_names"):  # Arrow
-            self.units = {**self.units, **_field_units(table.schema)}
+            stated = ((one.name, one.metadata or {}) for one in table.schema)
+            units = {name: (of.get(b"unit") or of.get(b"units", b"")).decode(errors="replace") for name, of in stated}
+            self.units = {**self.units, **{name: unit for name, unit in units.items() if unit}}
             self.twins = with_own_names(table.column_names)[1]
         try:
             check_same_index(**self._given)
@@ -136,12 +138,6 @@ def _columns_of(table: Any) -> dict[str, Any]:
         labels = set(table.indexes) - set(known_names("t", list(map(str, table.indexes))))
         fields = [name for name in (*table.data_vars, *table.coords) if name not in labels]
     return {str(name): table[name] for name in (fields or getattr(table, "columns", table))}
-
-
-def _field_units(schema: Any) -> dict[str, str]:
-    """Return the units that Arrow's fields state, by their names."""
-    stated = {one.name: next(filter(None, map((one.metadata or {}).get, (b"unit", b"units"))), b"") for one in schema}
-    return {name: unit.decode(errors="replace") for name, unit in stated.items() if unit}
 
 
 class NpzSource(GivenSource):
@@ -211,7 +207,7 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 class ParquetSource(TableSource):
-    """The columns of a Parquet file; fields of structs are ``struct.field``.
+    """The columns of a Parquet file, read where they are asked for; fields of structs are ``struct.field``.
 
     Nothing in the place of a number is NaN. Timestamps, times of day and durations become seconds since the first one.
     """
@@ -222,17 +218,28 @@ class ParquetSource(TableSource):
 
     def __init__(self, path: Path) -> None:
         try:
-            arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
+            self._parquet = import_module("pyarrow.parquet")
         except ModuleNotFoundError as error:
             raise LogError(f"{path}: is a Parquet file, which needs: pip install 'hybridsep[parquet]'") from error
-        with _reading(path, "a Parquet file"), parquet.ParquetFile(path) as file:
-            table = file.read()
-            while any(map(arrow.types.is_struct, table.schema.types)):
-                table = table.flatten()
-        times = [(i, field.type) for i, field in enumerate(table.schema) if arrow.types.is_time(field.type)]
-        for i, kind in times:
-            counts = table.column(i).cast(arrow.int32() if kind.bit_width == 32 else arrow.int64())
-            seconds = past_midnights(counts.to_numpy() * TIME_UNITS[kind.unit].factor, 86_400.0)
-            table = table.set_column(i, table.column_names[i], arrow.array(seconds - seconds[:1]))
-        super().__init__(table, path)
-        self.units = {**self.units, **{self.names[i]: "s" for i, _ in times}}
+        with _reading(path, "a Parquet file"), self._parquet.ParquetFile(path) as file:
+            super().__init__(_flat(file.schema_arrow.empty_table()), path)
+
+    def read(self, names: Sequence[str]) -> Block:
+        """Return the columns ``names``; LogError if they cannot be read."""
+        first = {twin: name for name, twins in self.twins.items() for twin in twins}
+        with _reading(self.path, "a Parquet file"), self._parquet.ParquetFile(self.path) as file:
+            table = _flat(file.read(columns=[first.get(name, name) for name in names]))
+            return TableSource(table, self.path).read(names)
+
+
+def _flat(table: Any) -> Any:
+    """Return an Arrow table with the fields of structs as columns, and times of day in seconds since the first one."""
+    while any(str(kind).startswith("struct<") for kind in table.schema.types):
+        table = table.flatten()
+    for i, field in enumerate(table.schema):
+        if (kind := str(field.type)).startswith(("time32", "time64")):  # time32[ms]
+            counts = table.column(i).cast(f"int{kind[4:6]}").to_numpy()
+            seconds = past_midnights(counts * TIME_UNITS[kind[7:-1]].factor, 86_400.0)
+            own = import_module("pyarrow").field(field.name, "float64", metadata={"unit": "s"})
+            table = table.set_column(i, own, [seconds - seconds[:1]])
+    return table

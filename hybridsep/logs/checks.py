@@ -42,8 +42,9 @@ _GAINS, _KNOWN = (0.1, 5.0), 0.03
 """Gains beyond which no position loop is: a small servo under load was recorded at 0.25; and relative distance from the
 ratio of two units within which it is meant."""
 
-_TRAVEL_MAX, _ACCELERATION_MAX, _OVER = 20.0, 500.0, 10
-"""Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit."""
+_TRAVEL_MAX, _ACCELERATION_MAX, _ACCELERATION_MIN, _OVER = 20.0, 500.0, 1e-3, 10
+"""Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit; and the least
+one, m/s² or rad/s², of an axis that follows a second late, whose times state none: these may be in ms."""
 
 _START = 0.25  # velocity between the first samples, in the largest, from which a start is in motion; EMPS has 0.12
 _COUNTS, _IN_A_SAMPLE, _WHOLE = 2**16, 0.1, 1e-2  # of a counter: range, motion in a sample relative to it, rounding
@@ -162,13 +163,7 @@ def _unit(log: Log) -> Iterator[Finding]:
     """Find positions that no axis has in metres; they are refused where nothing states their unit."""
     if log.unit != "m":
         return
-    accelerations = [
-        np.abs(one.x_d[2 * _OVER :] - 2.0 * one.x_d[_OVER:-_OVER] + one.x_d[: -2 * _OVER]) / (_OVER * log.T_s) ** 2
-        for one in log.segments()
-    ]
-    moving = np.concatenate([one[one > 0.0] for one in accelerations])
-    usual = float(np.quantile(moving, _USUAL)) if len(moving) else 0.0
-    travel = _travel(log.x_d)
+    usual, travel = _acceleration(log), _travel(log.x_d)
     if travel <= _TRAVEL_MAX and usual <= _ACCELERATION_MAX:
         return
     words = (
@@ -178,6 +173,16 @@ def _unit(log: Log) -> Iterator[Finding]:
     evidence, stated = {"travel": travel, "acceleration": usual}, log.unit_stated
     options = (("--unit mm", "a linear axis in mm"), ("--unit um", "in µm"), ("--unit deg", "a joint in degrees"))
     yield Finding("unit", words, evidence, refused=not stated, options=() if stated else options)
+
+
+def _acceleration(log: Log) -> float:
+    """Return what is usually the largest acceleration of a command in motion, m/s² or rad/s²."""
+    accelerations = [
+        np.abs(one.x_d[2 * _OVER :] - 2.0 * one.x_d[_OVER:-_OVER] + one.x_d[: -2 * _OVER]) / (_OVER * log.T_s) ** 2
+        for one in log.segments()
+    ]
+    moving = np.concatenate([one[one > 0.0] for one in accelerations])
+    return float(np.quantile(moving, _USUAL)) if len(moving) else 0.0
 
 
 class _Following(NamedTuple):
@@ -406,8 +411,10 @@ def _note_relation(log: Log, x_d: Array, x: Array, found: _Following) -> Iterato
             f"the measured position lags its command by {least}{late} samples ({late * log.T_s:.3g} s), drive, dead "
             f"time and recorder together{': were ms given as s?' if late * log.T_s > 1.0 else ''}"
         )
-        options = (("--delay N", "where the recorder is known to be N samples late"),)
-        yield Finding("late", words, {"lag": late * log.T_s}, options=options)
+        options: tuple[tuple[str, str], ...] = (("--delay N", "where the recorder is known to be N samples late"),)
+        if refused := late * log.T_s > 1.0 and not log.time_stated and _acceleration(log) < _ACCELERATION_MIN:
+            options = ((f"--T_s {1e-3 * log.T_s:g}", "where times are in ms"), (f"--T_s {log.T_s:g}", "where in s"))
+        yield Finding("late", words, {"lag": late * log.T_s}, refused, options)
     error = x - x_d[np.maximum(np.arange(len(x_d)) - late, 0)]
     way = np.sign(np.diff(x_d, prepend=x_d[0]))  # in only one direction a lag looks like an offset
     parts = [part for part in (error[way == one] for one in (-1.0, 0.0, 1.0)) if np.isfinite(part).sum() > _SAMPLES_MIN]
@@ -444,8 +451,7 @@ def _spikes(x: Array, travel: float) -> tuple[Indices, Array]:
     """Return the samples that leave a signal, (n,), by far, and by how much; it comes back, but at its ends."""
     steps = np.diff(np.pad(x, 1, mode="reflect"))
     heights = np.where(steps[:-1] * steps[1:] < 0.0, np.minimum(np.abs(steps[:-1]), np.abs(steps[1:])), 0.0)
-    usual = float(np.nanquantile(np.abs(steps), _USUAL))
-    wrong = np.flatnonzero(heights > max(10.0 * usual, 0.02 * travel))
+    wrong = np.flatnonzero(heights > max(10.0 * float(np.nanquantile(np.abs(steps), _USUAL)), 0.02 * travel))
     return wrong, heights[wrong]
 
 

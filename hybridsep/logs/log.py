@@ -60,8 +60,8 @@ class Log:
         The file.
     unit : {"m", "rad"}
         Unit of the positions.
-    unit_stated : bool
-        Whether the file or the caller stated the positions' unit.
+    unit_stated, time_stated : bool
+        Whether the file or the caller stated the positions' unit; and the times', or the interval.
     starts : tuple of int
         First samples of the segments, which gaps and clocks that were set back separate; the first is 0.
     remarks : tuple of str
@@ -93,6 +93,7 @@ class Log:
     T_recorded: float = 0.0
     columns: Mapping[str, str] = field(default_factory=lambda: {"x_d": "x_d", "x": "x"})
     signals: Mapping[str, Array] = field(default_factory=dict)
+    time_stated: bool = True
 
     @property
     def shown(self) -> DisplayUnits:
@@ -182,6 +183,7 @@ def read_log(
     log = Log(
         *(times.t, x_d, x_meas, times.T_s, path, chosen["x_d"].unit.si),
         unit_stated=chosen["x_d"].stated and chosen["x"].stated,
+        time_stated=given is not None or (time is not None and time.stated),
         starts=times.starts,
         file_unit=chosen["x_d"].unit.name,
         n_recorded=len(x_d),

@@ -18,7 +18,7 @@ planned, that which enters the position loop, later and interpolated, the measur
 its deviation from the contour."""
 
 _NAMES: Mapping[str, tuple[str, ...]] = {
-    "t": ("t", "time", "timestamp", "time_stamp", "sec", "seconds", "epoch", "zeit", "millis", "micros"),
+    "t": ("t", "time", "timestamp", "time_stamp", "sec", "seconds", "epoch", "zeit", "millis", "micros", "tout"),
     "x_d": (
         "x_d", "xd", "x_ref", "xref", "x_cmd", "x_set", "x_des", "reference", "setpoint", "set_point", "command",
         "commanded", "position_commanded", "commanded_position", "pos_cmd", "cmd_pos", "pos_ref", "pos_set", "ctrl_pos",

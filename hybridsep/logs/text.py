@@ -26,7 +26,7 @@ from ..base.errors import LogError, brief, first_line
 from ..base.signals import Array
 from .names import n_known
 from .source import Block, Source, past_midnights
-from .units import plain_name, position_unit, time_unit
+from .units import COUNTS, POSITION_UNITS, plain_name, position_unit, time_unit
 
 _BLOCK = 10_000  # lines that are converted at once
 
@@ -38,6 +38,7 @@ _HEAD = 4  # rows above the numbers of which one has the names: units and descri
 _FACTOR = re.compile(r"[x*×/]\s*[.,\d]")  # begins a cell of a row of factors, which no reader may pass over
 _WITH_UNIT = re.compile(r"^([+-]?[\d.,]+(?:e[+-]?\d+)?)\s+([a-zµ]+)$", re.IGNORECASE)  # 0.001 sec, as of MATLAB
 _NO_UNITS = ("", "-", "1", "[-]")  # entries of a row of units where a column has none
+_POSITIONS = {*POSITION_UNITS, *COUNTS, "grad"} - {"m", "in"}  # two of these, or of another, make a row of units
 _BLANK = -math.inf  # stands for a blank cell of the command until it is filled
 _APART = 0.9  # share of rows with one of the two positions from which on channels have times of their own
 
@@ -341,8 +342,8 @@ def _encoding(head: bytes) -> str:
 
 def _hint(field: str, comma: str | None) -> str:
     if comma == "." and is_number(field):
-        return "; other lines have decimal commas"
-    if is_number(field.replace(".", "").replace(",", ".")) or is_number(field.replace(",", "")):
+        return "; other lines have decimal commas, or it divides thousands"
+    if is_number(re.sub(r"[.\s'’]", "", field).replace(",", ".")) or is_number(field.replace(",", "")):
         return "; write numbers without separators of thousands"
     return "; write times of day as hh:mm:ss with up to 9 decimals, or as seconds" if ":" in field else ""
 
@@ -412,14 +413,16 @@ def _with_names(rows: Sequence[tuple[int, list[str], str]], start: int, end: int
             break
     if not above:
         return None
-    of_units = [_is_row_of_units([a for a, b in zip(row, kinds, strict=False) if not b]) for _, row in above]
+    cells = [[a for a, b in zip(row, kinds, strict=False) if not b] for _, row in above]
+    of_units = [_is_row_of_units(row) and n_known(row) < 2 for row in cells]
     factors = (i + 1 for i, (_, row) in enumerate(above) if any(map(_FACTOR.match, row)))  # nothing above is looked at
     near = [i for i, is_units in enumerate(of_units[: min(_HEAD, next(factors, _HEAD))]) if not is_units] or [0]
     at = max(near, key=lambda i: (n_known(above[i][1]), -i))  # the one with more known names counts, else the nearest
     header, names = above[at]
-    below = (row for (_, row), is_units in zip(above[:at], of_units, strict=False) if is_units)
+    over = [i for i, (_, row) in enumerate(above) if i == at + 1 and not re.search(r"\d", "".join(row))]  # the names
+    beside = (above[i][1] for i in [*range(at), *over] if of_units[i] and not _UNIT_ROW.fullmatch(above[i][1][0]))
     keyed = (row for _, row in above[:9] if row is not names and _UNIT_ROW.fullmatch(row[0]))
-    units = dict(zip(names, next(below, ["", *next(keyed, [""])[1:]]), strict=False))
+    units = dict(zip(names, next(beside, ["", *next(keyed, [""])[1:]]), strict=False))
     behind = [[(_WITH_UNIT.match(row[i]) or ("",) * 3)[2] for row in fields[:9] if row[i]] for i in range(len(names))]
     in_cells = {i: one[0] for i, one in enumerate(behind) if len({*one}) == 1 and _is_row_of_units(one)}
     units |= {names[i]: unit for i, unit in in_cells.items()}
@@ -443,6 +446,8 @@ def _comma_of(columns: Sequence[Sequence[str]]) -> tuple[str | None, bool]:
     points = any("." in text for text in numbers)
     several = any(text.count(",") > 1 for text in commas)
     settled = not all(map(_THOUSANDS.fullmatch, commas))
+    if not commas and any(_passes_1000([text.replace(".", ",") for text in column]) for column in columns):
+        return ".", True  # points are between thousands, and refused
     if not settled and (points or several or any(map(_passes_1000, columns))):
         return "", True
     return "." if commas and not points else None, settled
@@ -452,10 +457,12 @@ def _passes_1000(column: Sequence[str]) -> bool:
     """Return whether only whole numbers below 1000 lack a comma, and neighbours are closer if it is of thousands."""
     column = [text for text in column if not _MISSING.fullmatch(text)]
     plain = [text for text in column if "," not in text]
-    if not 0 < len(plain) < len(column) or not all(map(_BELOW_1000.fullmatch, plain)):
+    grouped = all(_THOUSANDS.fullmatch(text) for text in column if "," in text)
+    if not 0 < len(plain) < len(column) or not (grouped and all(map(_BELOW_1000.fullmatch, plain))):
         return False
-    grouped, decimal = ([float(text.replace(",", mark)) for text in column] for mark in ("", "."))
-    return max(abs(b - a) for a, b in pairwise(grouped)) < max(abs(b - a) for a, b in pairwise(decimal))
+    steps = ([float(text.replace(",", mark)) for text in column] for mark in ("", "."))
+    whole, decimal = (max(abs(b - a) for a, b in pairwise(one)) for one in steps)
+    return whole < decimal
 
 
 def _are_row_names(cells: Sequence[str]) -> bool:
@@ -484,7 +491,8 @@ def _names(line: str, delimiter: str | None) -> list[str]:
 
 
 def _is_row_of_units(fields: Sequence[str]) -> bool:
-    texts = [field.strip("[]()").strip() for field in fields]
-    known = [bool(position_unit(text) or time_unit(text) or "/" in text) for text in texts]
-    blank = [plain_name(text) in _NO_UNITS for text in texts]
-    return any(known) and all(a or b for a, b in zip(known, blank, strict=True))
+    """Return whether fields are units, or two of them are units of positions, whatever is beside them."""
+    plain = [plain_name(field.strip("[]()")) for field in fields]
+    known = [bool(position_unit(one) or time_unit(one) or "/" in one) for one in plain]
+    n = [plain.count("m"), plain.count("in"), sum(one in _POSITIONS or one.rstrip("s") in _POSITIONS for one in plain)]
+    return max(n) > 1 or (any(known) and all(a or b in _NO_UNITS for a, b in zip(known, plain, strict=True)))

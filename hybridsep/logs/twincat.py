@@ -98,13 +98,9 @@ class TwinCatSource(ArraysSource):
         units = {name: _cell(row_of_units, places[name][0]).partition("(")[0].strip() for name in self.times}
         stated = {name: unit for name, unit in units.items() if unit}  # of ``mm (Length)``; ``(None)`` states none
         self.units = {**stated, **dict.fromkeys(clocks.values(), "s")}
-        self._intervals = {
-            name: 1e-3 * float(text)
-            for name in self.times
-            if is_number(text := _cell(intervals, places[name][0]).replace(",", "."))
-        }
-        fastest = min(self._intervals.values(), default=0.0)
-        self._slow = {self.times[name] for name, interval in self._intervals.items() if interval > fastest}
+        texts = {name: _cell(intervals, places[name][0]).replace(",", ".") for name in self.times}
+        known = {name: float(text) for name, text in texts.items() if is_number(text)}
+        self._slow = {self.times[name] for name, interval in known.items() if interval > min(known.values())}
         return places
 
     def column(self, name: str) -> Array:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..base.errors import SignalError, brief
@@ -112,10 +112,10 @@ _SUFFIXES |= {"arcsec", "s", "ms", "us", "ns", "counts", "ticks"}
 """Units that end a name after an underscore or a comma; m is none, as ``x_m`` is rather the measured position."""
 
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*$")
-_INSIDE = re.compile(r"\s*\((?P<unit>[^()]+)\)\s+")
+_INSIDE = re.compile(r"\s*[\[(](?P<unit>[^()\[\]]+)[\])]\s+")
 _SLASH = re.compile(r"^(?P<name>.*?\S)\s*(?:/|\bin\b)\s*(?P<unit>\S+)\s*$")
 _MULTIPLE = re.compile(r"^\s*(?P<times>\d*\.?\d+(?:[eE][+-]?\d+)?)\s*(?P<unit>\S+)\s*$")
-_SUFFIX = re.compile(r"^(?P<name>.*?[^_\s,])(?:_|\s*,\s*)(?P<unit>[^_\s,]+)$")
+_SUFFIX = re.compile(r"^(?P<name>.*?[^_\s,])(?:_|\s*,\s*|\s+(?=[a-zµμ]{2,}$))(?P<unit>[^_\s,]+)$")
 
 
 def plain_name(text: str) -> str:
@@ -138,16 +138,12 @@ def position_unit(text: str, known_units: Mapping[str, Unit] = POSITION_UNITS) -
     )
 
 
-def si_factor(own: str) -> Callable[[str], float]:
-    """Return the function that gives the factor to SI of a unit, ``own`` where it is empty; SignalError of others."""
-
-    def factor(stated: str) -> float:
-        unit, usual = position_unit(stated or own), position_unit(own)
-        if unit is None or usual is None or unit.si != usual.si:
-            raise SignalError(f"positions must be in {own} or a unit of its kind, got {brief(stated)}")
-        return unit.factor
-
-    return factor
+def si_factor(own: str, stated: str) -> float:
+    """Return the factor to SI of a unit, of ``own`` where it is empty; SignalError if it is not of its kind."""
+    unit, usual = position_unit(stated or own), position_unit(own)
+    if unit is None or usual is None or unit.si != usual.si:
+        raise SignalError(f"positions must be in {own} or a unit of its kind, got {brief(stated)}")
+    return unit.factor
 
 
 def time_unit(text: str) -> Unit | None:

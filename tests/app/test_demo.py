@@ -148,8 +148,7 @@ def test_a_full_demo_writes_all_it_promises(full: Demonstration) -> None:
     assert tuple(full.summary) == CASES
     for case in full.summary.values():
         check_case(case)
-    figures = [*CASES, "spiral_contour", *(f"{case}_compensated" for case in CASES)]
-    check_files(full, figures, full=True)
+    check_files(full, [*CASES, "spiral_contour", *(f"{case}_compensated" for case in CASES)], full=True)
     assert len(list((full.out / "fmus").glob("*.fmu"))) == 9
     assert len(list((full.out / "fmus" / "warm").glob("SepCompensator*.fmu"))) == 3
 

@@ -168,8 +168,7 @@ def test_cosim_says_which_limit_binds_and_what_it_costs(
     machine = changed_machine(tmp_path / "axis.toml", LOOPS / "axis.toml", limits)
     with gzip.open(LOOPS / "commands.csv.gz") as commands:
         (tmp_path / "commands.csv").write_bytes(commands.read())
-    out = hybridsep.done("cosim", "-m", machine, "--compensate", "hybrid", "--json")
-    found = json.loads(out)
+    found = json.loads(hybridsep.done("cosim", "-m", machine, "--compensate", "hybrid", "--json"))
     assert found["limits_that_bind"] == pytest.approx(bound, abs=1e-3)
     assert found["tracking_rms_um"] < most
     assert (found["limit_costs"] is not None) == bool(bound)

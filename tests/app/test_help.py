@@ -78,8 +78,7 @@ def test_each_command_has_two_examples_that_run(
 
 
 def test_help_has_examples(hybridsep: Run) -> None:
-    out = hybridsep.done("fit", "--help")
-    assert "  hybridsep fit my_axis.csv --Np 100\n" in out
+    assert "  hybridsep fit my_axis.csv --Np 100\n" in hybridsep.done("fit", "--help")
 
 
 @pytest.mark.parametrize("name", cli.PLUG_INS)
@@ -152,8 +151,7 @@ def test_the_lines_that_fit_prints_end_in_a_compensated_run(
 
 def test_a_lag(hybridsep: Run, tmp_path: Path) -> None:
     path = tmp_path / "x_axis.toml"
-    out = hybridsep.done("init", path)
-    assert "written: a lag, tau = 0.006" in out
+    assert "written: a lag, tau = 0.006" in hybridsep.done("init", path)
     machine = load_machine(path)
     assert (machine.name, machine.T_s, machine.predictor_settings.Np) == ("x_axis", 1e-3, 100)
     omega = np.array([1.0, 100.0])

@@ -50,8 +50,7 @@ def test_hold_skips_what_is_missing_and_what_has_not_arrived() -> None:
     for late, held in ((0, [0.0, 2.0, 3.0, 6.0, 6.0]), (1, [0.0, 1.0, 3.0, 5.0, 6.0]), (5, [0.0, 0.0, 0.0, 1.0, 3.0])):
         np.testing.assert_array_equal(hold(x_pb, x, active, 2, late=late), x_pb + np.repeat(held, 2))
     np.testing.assert_array_equal(hold(x_pb, x, np.arange(10) > 5, 2)[:6], x_pb[:6])  # the warm-up
-    nothing = np.full(10, np.nan)
-    np.testing.assert_array_equal(hold(x_pb, nothing, active, 2), x_pb)
+    np.testing.assert_array_equal(hold(x_pb, np.full(10, np.nan), active, 2), x_pb)
 
 
 def test_batch_rms_with_a_short_last_batch() -> None:

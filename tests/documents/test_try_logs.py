@@ -25,7 +25,7 @@ X = np.r_[X_D[:1].repeat(7), X_D[:-7]]
 
 HEADS = (
     "t [s],x_d [mm],x [mm]", "t,x_d (mm),x (mm)", "time / s,x_d / mm,x / mm", "t_s,x_d_mm,x_mm",
-    "zeit,x_d [Millimeter],x [mm]",
+    "zeit,x_d [Millimeter],x [mm]", "t_s,x_d mm,x mm",
     "t [s];x_d [mm];x [mm]", "t [s]\tx_d [mm]\tx [mm]", '"t [s]","x_d [mm]","x [mm]"', "t [s],xref [mm],x_meas [mm]",
     "# a log\nt [s],x_d [mm],x [mm]", "t,x_d,x\ns,mm,mm", "\ufefft [s],x_d [mm],x [mm]", "t [s],x_d in mm,x in mm",
 )  # fmt: skip
@@ -65,6 +65,7 @@ def logs() -> Iterator[tuple[str, str]]:
         yield f"thousands_{ord(mark)}", f"t [s]{mark}x_d [um]{mark}x [um]\n{texts}"
     whole = "".join(f"{k};{a:,.0f};{b:,.0f}\n" for k, (_, a, b) in enumerate(zip(*thousands, strict=True)))
     yield "thousands_whole", f"t [ms];x_d [um];x [um]\n{whole}"
+    yield "points_whole", f"t [ms];x_d [um];x [um]\n{whole.replace(',', '.')}"
     quoted = "".join(f'{t / 1e3:.3f},"{a:,.0f}","{b:,.0f}"\n' for t, a, b in zip(*thousands, strict=True))
     yield "thousands_quoted", f"t [s],x_d [um],x [um]\n{quoted}"
     yield "points_and_commas", "t [s];x_d [mm];x [mm]\n0.000;1,5;1,5\n" + rows([T[1:], X_D[1:], X[1:]], mark=";")

@@ -101,8 +101,7 @@ def test_without_samples_that_train_there_are_refitted_models_alone() -> None:
 def test_an_unstable_model_diverges() -> None:
     x_d = 0.01 * np.sin(0.05 * np.arange(900))
     x = x_d + 1e-9 * 1.08 ** np.arange(900.0).clip(max=150)  # what trains grows by 8 % a sample
-    found = predict_peers([Piece(x_d, x, 140, 150)], 700)
-    assert peer(found, "ARX20", FROZEN).diverged
+    assert peer(predict_peers([Piece(x_d, x, 140, 150)], 700), "ARX20", FROZEN).diverged
 
 
 def test_an_axis_without_lag_has_none_in_its_peer() -> None:

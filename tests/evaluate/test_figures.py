@@ -68,5 +68,4 @@ def test_a_rotary_axis_is_shown_in_angles(tmp_path: Path, capsys: pytest.Capture
     assert "prediction error in µrad" in said
     with figures_drawn() as drawn:
         tracking_figure({"hybrid": run}, "Table", tmp_path / "a.png", shown_in("deg"))
-    labels = [axes.get_ylabel().partition("[")[2] for axes in drawn[0].axes]
-    assert labels == ["deg]", "mdeg]", "mdeg]"]
+    assert [axes.get_ylabel().partition("[")[2] for axes in drawn[0].axes] == ["deg]", "mdeg]", "mdeg]"]

@@ -131,8 +131,7 @@ def test_the_window_after_a_gap_does_not_judge() -> None:
 
 
 def test_the_window_after_a_gap_judges_where_little_else_would() -> None:
-    judging = split_log(pieces(40, 10, 12), 0.6, 20)
-    assert sum(len(part.x) - part.judges_from for part in judging) == 25
+    assert sum(len(part.x) - part.judges_from for part in split_log(pieces(40, 10, 12), 0.6, 20)) == 25
 
 
 T_S, TAU = 1e-3, 0.02

@@ -150,8 +150,7 @@ def test_what_was_compiled_is_kept_by_sources_and_compiler(without: Path, monkey
     assert module._place("ziglang 0.1", ("FeedDrive", "x86_64-linux")) != place
     fill(place.parent.parent, [("FeedDrive", "x86_64-linux")])
     assert kept(("FeedDrive", "x86_64-linux")) == place
-    sources = {**c_sources(), "all.c": b"int other;"}
-    monkeypatch.setattr(module, "c_sources", lambda: sources)
+    monkeypatch.setattr(module, "c_sources", lambda: {**c_sources(), "all.c": b"int other;"})
     module._version.cache_clear()
     assert kept(("FeedDrive", "x86_64-linux")) is None
     module._version.cache_clear()

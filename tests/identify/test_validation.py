@@ -78,8 +78,7 @@ def test_where_a_command_has_no_power_nothing_is_known(noise: float) -> None:
 
 
 def test_where_one_segment_has_all_power_nothing_is_known() -> None:
-    x_d = np.where(np.arange(N) < 10_000, 0.0, 1e-3)
-    assert not response(x_d, 0.0).known.any()
+    assert not response(np.where(np.arange(N) < 10_000, 0.0, 1e-3), 0.0).known.any()
 
 
 def test_no_segment_reaches_over_a_gap_or_a_missing_sample() -> None:

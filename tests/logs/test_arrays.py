@@ -149,7 +149,7 @@ def test_bad_arrays(tmp_path: Path, suffix: str, bad: Columns, message: str) -> 
 
 def test_a_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path / "log.parquet", columns())
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     refused(r"log.parquet: is a Parquet file, which needs: pip install 'hybridsep\[parquet\]'$", path)
 
 
@@ -166,10 +166,13 @@ def test_nulls_times_structs_and_decimals(tmp_path: Path) -> None:
     refused(r"column 'note' must be numbers: values of type str", path, columns={**names, "x": "note"})
 
 
-def test_units_in_the_metadata_of_fields(tmp_path: Path) -> None:
+def test_units_in_the_metadata_of_fields(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fields = [pa.field(name, pa.float64(), metadata={"unit": "mm"}) for name in ("x_d", "x", "q", "q")]
     pq.write_table(pa.table([X_D, X, X, X_D], schema=pa.schema(fields)), tmp_path / "log")
+    read, asked = pq.ParquetFile.read, dict[str, list[str]]()
+    monkeypatch.setattr(pq.ParquetFile, "read", lambda one, columns: read(one, asked.setdefault("read", columns)))
     assert read_log(tmp_path / "log", T_s=1e-3).file_unit == "mm"
+    assert asked == {"read": ["x_d", "x"]}
 
 
 @pytest.mark.skipif(not CASES.is_dir(), reason="needs ../shared/cases/logs beside the repository")

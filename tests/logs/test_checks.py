@@ -295,8 +295,7 @@ def test_a_quiet_sensors_swap_is_found_and_no_shift_is_offered() -> None:
     with pytest.raises(LogError, match=r"columns swapped: x_d follows x, 7\.2 samples later") as caught:
         checked(log)
     assert [option for option, _ in caught.value.options] == ["--x_d 'x [mm]' --x 'x_d [mm]'"]
-    right = read_log(CASES / "swap.csv.gz", columns={"x_d": "x", "x": "x_d"})
-    assert names(right) == []
+    assert names(read_log(CASES / "swap.csv.gz", columns={"x_d": "x", "x": "x_d"})) == []
 
 
 def test_a_shift_is_offered_where_the_measured_column_is_the_noisier_one() -> None:
@@ -342,12 +341,20 @@ def sines() -> Log:
 
 @pytest.mark.parametrize("name", NOTES)
 def test_what_is_noted_has_a_statistic_and_changes_nothing(name: str) -> None:
-    log = NOTES[name](sines())
-    found = {one.name: one for one in checked(log)}
+    found = {one.name: one for one in checked(NOTES[name](sines()))}
     assert name in found
     assert found[name].evidence
     assert name != "late" or "lags its command by 406 samples (0.406 s)" in found[name].words  # 6 of the drive
     assert str(found[name]).startswith(f"note: {name}: ")
+
+
+def test_milliseconds_that_are_called_seconds_are_refused_where_nothing_states_them() -> None:
+    log = NOTES["late"](sines())
+    in_ms = replace(log, t=1e3 * log.t, T_s=1e3 * log.T_s)
+    assert not any(one.refused for one in check(in_ms))
+    (finding,) = [one for one in check(replace(in_ms, time_stated=False)) if one.refused]
+    assert finding.options[0] == ("--T_s 0.001", "where times are in ms")
+    assert not any(one.refused for one in check(replace(log, time_stated=False)))
 
 
 def test_what_moves_an_axis_at_rest_is_not_learned() -> None:

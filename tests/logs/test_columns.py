@@ -70,7 +70,7 @@ def test_a_time_beside_each_channel(tmp_path: Path) -> None:
     assert read_log(write_csv(tmp_path / "log.csv", f"Uhr;x_d;Uhr;x\n{stamps}")).T_s == 1.0
 
 
-@pytest.mark.parametrize("name", ["trace.t", "trace.time [s]", "t", "tick"])
+@pytest.mark.parametrize("name", ["trace.t", "trace.time [s]", "trace.tout", "t", "tick"])
 def test_columns_in_a_struct_are_guessed_beside_those_that_are_named(tmp_path: Path, name: str) -> None:
     """A time that was named kept the positions from being found; ``trace.t`` was no time."""
     data = columns()

@@ -111,8 +111,7 @@ def test_figures_and_words() -> None:
 
 
 def test_without_the_command_of_the_loop_the_delay_is_all_that_is_known() -> None:
-    data = signals()
-    log = read_log({name: data[name] for name in ("DES_POS|1", "ENC_POS|1")}, unit="mm", T_s=T_S)
+    log = read_log({name: signals()[name] for name in ("DES_POS|1", "ENC_POS|1")}, unit="mm", T_s=T_S)
     found = controller_of([log])
     assert found is not None
     assert (log.columns["x_d"], found.delay, found.look_ahead) == ("DES_POS|1", 7, None)
@@ -123,8 +122,7 @@ def test_without_the_command_of_the_loop_the_delay_is_all_that_is_known() -> Non
 def test_a_rotary_axis_wraps_each_signal_at_its_own_time() -> None:
     data = {name: np.mod(values, 360.0) for name, values in signals(40.0).items() if name[:3] in ("ENC", "DES", "CTR")}
     data["CTRL_DIFF|1"] = signals(40.0)["CTRL_DIFF|1"]
-    log = read_log(data, axis="1", unit="deg", T_s=T_S)
-    found = controller_of([log])
+    found = controller_of([read_log(data, axis="1", unit="deg", T_s=T_S)])
     assert found is not None
     assert (found.delay, found.look_ahead) == (7, 6)
     assert found.behind_plan is not None

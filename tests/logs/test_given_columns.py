@@ -149,11 +149,9 @@ def test_gaps_in_the_labels_are_gaps(step: int) -> None:
     np.testing.assert_allclose(log.x_d, in_place.x_d, atol=1e-6)
     np.testing.assert_array_equal(log.x_meas, in_place.x_meas)
     assert read_log(Frame(Labelled(np.arange(N) + 7), x_d=X_D, x=X), T_s=1e-3).starts == (0,)
-    joined = np.r_[0:1500, 0:1500]
-    assert read_log(Frame(Labelled(joined), x_d=X_D, x=X), T_s=1e-3).starts == (0, 1500)
+    assert read_log(Frame(Labelled(np.r_[0:1500, 0:1500]), x_d=X_D, x=X), T_s=1e-3).starts == (0, 1500)
     assert read_log(Frame(Labelled(np.arange(N), name="time [ms]"), x_d=X_D, x=X)).T_s == 1e-3
-    texts = Labelled(np.arange(N).astype(str))
-    assert read_log(Frame(texts, x_d=X_D, x=X), T_s=1e-3).starts == (0,)
+    assert read_log(Frame(Labelled(np.arange(N).astype(str)), x_d=X_D, x=X), T_s=1e-3).starts == (0,)
 
 
 def test_labels_of_samples() -> None:
@@ -214,30 +212,27 @@ def test_what_is_no_log(given: Any) -> None:
 OF_TOOLS = (
     "target_q_{} | actual_q_{} | target_qd_{} | actual_qd_{} @ 3; q_cmd[{}] | q_act[{}] @ 3; x_d[{}] | x[{}] @ 3; "
     "desired.positions[{}] | actual.positions[{}] | desired.velocities[{}] @ 3; set_point | process_value; "
-    "/arm/state/reference/positions[{}] | /arm/state/feedback/positions[{}] @ 3; ref | fb | control; "
-    "ctrl_pos|{} | enc_pos|{} | des_pos|{} @ 3; cmd | pos | action | observation; "
-    "Axis_{}.Position | Axis_{}.ActualPosition | Axis_{}.Velocity | Axis_{}.ActualVelocity @ 3; "
-    "/joint_commands/a{}/position | /joint_states/a{}/position @ a3; RPOS({}) | FPOS({}) | PE({}) @ 1; "
-    "s noml X [mm] | s actual X [mm] | s diff X [mm] | v noml X [mm/min]; PCMD(X)[mm] | POSF(X)[mm] | VCMD(X)[rpm]; "
-    "PL.CMD (mm) | PL.FB (mm) | PL.ERR (mm) | VL.CMD (rpm); A: PCTRL_S_SET | A: PCTRL_S_ACT | A: PCTRL_LAG_ERROR; "
-    "A Axis Reference Position | A Axis Motor Position | A Axis Position Error; "
-    "Cumulative command pulses[pulse] | Cumulative feedback pulses[pulse] | Droop pulses[pulse]; "
-    "Position Demand Value [qc] | Position Actual Value [qc] | Velocity Demand Value [rpm]; "
-    "Position demand value (0x6062) | Position actual value (0x6064) | Target position (0x607A); "
-    "Position Command [cnt] | Position [cnt] | Position Error [cnt]; "
+    "/arm/state/reference/positions[{}] | /arm/state/feedback/positions[{}] @ 3; ref | fb | control; ctrl_pos|{} | "
+    "enc_pos|{} | des_pos|{} @ 3; cmd | pos | action | observation; Axis_{}.Position | Axis_{}.ActualPosition | "
+    "Axis_{}.Velocity | Axis_{}.ActualVelocity @ 3; /joint_commands/a{}/position | /joint_states/a{}/position @ a3; "
+    "RPOS({}) | FPOS({}) | PE({}) @ 1; s noml X [mm] | s actual X [mm] | s diff X [mm] | v noml X [mm/min]; "
+    "PCMD(X)[mm] | POSF(X)[mm] | VCMD(X)[rpm]; PL.CMD (mm) | PL.FB (mm) | PL.ERR (mm) | VL.CMD (rpm); A: PCTRL_S_SET | "
+    "A: PCTRL_S_ACT | A: PCTRL_LAG_ERROR; A Axis Reference Position | A Axis Motor Position | A Axis Position Error; "
+    "Cumulative command pulses[pulse] | Cumulative feedback pulses[pulse] | Droop pulses[pulse]; Position Demand Value "
+    "[qc] | Position Actual Value [qc] | Velocity Demand Value [rpm]; Position demand value (0x6062) | Position actual "
+    "value (0x6064) | Target position (0x607A); Position Command [cnt] | Position [cnt] | Position Error [cnt]; "
     "S-0-0047, Lage-Sollwert [mm] | S-0-0051, Lage-Istwert Geber 1 [mm] | S-0-0189, Schleppabstand [mm]; "
     "axis0.controller.input_pos | axis0.pos_estimate | axis0.vel_estimate; control_position | position | velocity; "
-    "target | angle | voltage; theta_des | theta; J{}_cmd | J{}_fb @ J3; x_cmd_counts | x_fb_counts; "
-    "target_position | current_position | current; log.x_d.Data | log.x.Data; "
-    "Sollposition [unit] | Istposition [unit]; X_SollPos | X_IstPos; Lagesollwert Achse X | Lageistwert Achse X; "
-    "Position command | Position actual | Position command velocity | Position actual velocity; "
-    "q_des | q | current_setpoint | current_feedback; Y_cmd | Y_act | Y_estimate | Y_planned; "
-    "Z_ref | Z_act | Z_nominal; reference_position | position | estimated_position; q_des({}) | q({}) @ 1; "
-    "q_des[{}] | q[{}] @ 1; x_d({}) | x({}) @ 1; q_d[{}] | q[{}] | dq[{}] @ 2; _RPX | _TPX | _TEX; "
-    "TPOS | APOS | POSERR; RPOS(X) | FPOS(X) | APOS(X) | TPOS(X); DPOS AXIS(0) | MPOS AXIS(0) | FE AXIS(0); "
-    "goal_position | present_position | present_velocity; SetPos | ActPos | TargetPos; "
-    "RPOS | FPOS | DPOS | MPOS; action.pan.pos | observation.state.pan.pos; Sollwert_Weg | Istwert_Weg; "
-    "Group1.Pos.SetpointPosition | Group1.Pos.CurrentPosition | Group1.Pos.FollowingError"
+    "target | angle | voltage; theta_des | theta; J{}_cmd | J{}_fb @ J3; x_cmd_counts | x_fb_counts; target_position | "
+    "current_position | current; log.x_d.Data | log.x.Data; Sollposition [unit] | Istposition [unit]; X_SollPos | "
+    "X_IstPos; Lagesollwert Achse X | Lageistwert Achse X; Position command | Position actual | Position command "
+    "velocity | Position actual velocity; q_des | q | current_setpoint | current_feedback; Y_cmd | Y_act | Y_estimate "
+    "| Y_planned; Z_ref | Z_act | Z_nominal; reference_position | position | estimated_position; q_des({}) | q({}) @ "
+    "1; q_des[{}] | q[{}] @ 1; x_d({}) | x({}) @ 1; q_d[{}] | q[{}] | dq[{}] @ 2; _RPX | _TPX | _TEX; TPOS | APOS | "
+    "POSERR; RPOS(X) | FPOS(X) | APOS(X) | TPOS(X); DPOS AXIS(0) | MPOS AXIS(0) | FE AXIS(0); goal_position | "
+    "present_position | present_velocity; SetPos | ActPos | TargetPos; RPOS | FPOS | DPOS | MPOS; action.pan.pos | "
+    "observation.state.pan.pos; Sollwert_Weg | Istwert_Weg; Group1.Pos.SetpointPosition | Group1.Pos.CurrentPosition | "
+    "Group1.Pos.FollowingError"
 )
 """Commanded and measured position, then others, as controllers, drives and recorders call them; and the axis."""
 

@@ -223,8 +223,7 @@ def test_a_jump_of_the_time_begins_a_segment(tmp_path: Path, t: Array, by: float
 def test_rows_that_are_written_twice_are_left_out(tmp_path: Path) -> None:
     """They counted as samples: a log of 1 kHz was taken to have 1017 Hz, and so had its FMUs."""
     twice = np.sort(np.concatenate((np.arange(N), [7, 50, 51, 180, 182, 300, 420, 421, 422, 590])))
-    columns = {"t": 1e-3 * twice, "x_d": X_D[twice], "x": X[twice]}
-    log = read_log(write(tmp_path / "twice.npz", columns))
+    log = read_log(write(tmp_path / "twice.npz", {"t": 1e-3 * twice, "x_d": X_D[twice], "x": X[twice]}))
     assert (log.T_s, log.starts, len(log.t)) == (1e-3, (0,), N)
     np.testing.assert_array_equal(log.x_meas, X)
     assert log.remarks == ("10 of 610 rows repeat the one before, time included, first row 9: left out",)
@@ -274,8 +273,7 @@ def test_every_nth_sample_of_a_slow_sensor(tmp_path: Path, period: int) -> None:
     held = X[3:][np.maximum(np.arange(N - 3) - 3, 0) // period * period]
     log = read(tmp_path, 1e-3 * np.arange(N - 3), x=held)
     assert log.T_s == pytest.approx(period * 1e-3)
-    kept = np.arange(3 % period, N - 3, period)
-    np.testing.assert_array_equal(log.x_d, X_D[kept])
+    np.testing.assert_array_equal(log.x_d, X_D[np.arange(3 % period, N - 3, period)])
     assert log.remarks[0].startswith(f"the measured position is renewed every {period} samples (100 % of its changes")
 
 

@@ -64,6 +64,13 @@ TWO_ROWS = "0,1,2\n1,3,4\n"
         "Time;x_d;x\n0 ms;1000 mm;2.0 m\n1000 ms;3000 mm;4.0 m\n",
         "trace_path,time,Root/x_ref,Root/x_meas\ntrace_unit,s,mm,-\nvalues,0,1000,2\nvalues,1,3000,4\n",
         "Name;Zeit;Soll;Ist;U\nEinheit;ms;mm;mm;V\n;0;1000;2000;5\n;1000;3000;4000;5\n",
+        # Units of other quantities beside them, above the names, or after a blank
+        "Time;x_d;x;I;M;v;on\nms;mm;mm;A;%;rpm;BOOL\n0;1000;2000;5;5;5;1\n1000;3000;4000;5;5;5;1\n",
+        "s,mm,mm,°C\nt,cmd,act,T\n0,1000,2000,5\n1,3000,4000,5\n",
+        "run,5,a,b,c\nt,x_d,x,step,count\n0,1,2,5,5\n1,3,4,5,5\n",
+        "Unit,mm,mm\nTime[ms],PCMD(X),POSF(X)\n0,1000,2000\n1000,3000,4000\n",
+        ";5 mm;5 mm\nt;x_d;x\n0;1;2\n1;3;4\n",
+        "Time ms;Pos cmd mm;Pos [mm] act\n0;1000;2000\n1000;3000;4000\n",
     ],
 )
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "latin-1", "utf-16", "utf-16-le", "utf-16-be"])
@@ -77,6 +84,9 @@ def test_layouts(tmp_path: Path, text: str, encoding: str) -> None:
     ("text", "message"),
     [
         ("t,x_d [mm/s],x\n0,1,2\n", r"column 'x_d \[mm/s\]' must be a position in one of m, .* its unit is 'mm/s'"),
+        ("t,x_d,x,I\ns,inc,inc,A\n0,1,2,3\n1,3,4,3\n", "column 'x_d' is in encoder counts; give the length"),
+        ("t;x_d;x\ns;Grad;Grad\n0;1;2\n1;3;4\n", "must be a position in one of m, .*, its unit is 'Grad'"),
+        ("t;x_d;x\n0;1'047,9;2\n1;3;4,5\n", "'x_d' must be a number, got \"1'047,9\"; write numbers without"),
         ("t,x_d [counts],x\n0,1,2\n", r"'x_d \[counts\]' is in encoder counts; give the length of one.*--unit 0\.1um"),
         ("t,x_d [m],x [deg]\n0,1,2\n", r"'x_d \[m\]' is in m and column 'x \[deg\]' in deg; both must be lengths or"),
         ("t [h],x_d,x\n0,1,2\n", r"time 't \[h\]' must be in one of s, ms, us, ns, min, its unit is 'h'; correct"),
@@ -202,6 +212,8 @@ def test_axes_of_a_text(tmp_path: Path, names: str, axes: list[str]) -> None:
         ("0.000;120,000;119,999\n0.001;120,001;120,000\n", [120.0, 120.001]),
         ("0.000;0;1\n0.001;1,200;1,201\n", [0.0, 1.2]),
         ("0;999;998\n1;1,000;1,000\n", [0.999, 1.0]),
+        ("0;999;998\n1;1.000;1.000\n2;1.001;1.002\n", r"line 3: .* must be a number, got '1.000'; .* or it divides"),
+        ("0;0;0\n1;1.000;1.000\n2;1.001;1.002\n", [0.0, 1e-3, 1.001e-3]),
         ("0;120,000;1,000\n1;120,001;1,001\n", [0.12, 0.120001]),
         ("0.000;1,000,000.5;1,000,000\n0.001;1,000,001.5;1,000,000\n", [1000.0005, 1000.0015]),
         ("0,000;120,000;119,999\n0,001;120,001;120,000\n", [0.12, 0.120001]),

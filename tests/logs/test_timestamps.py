@@ -145,8 +145,7 @@ def test_seconds_that_count_up_are_no_index(tmp_path: Path) -> None:
 
 
 def test_the_only_column_of_timestamps_is_the_time(tmp_path: Path) -> None:
-    text = "recorded,x_d,x\n10:20:30,1,2\n10:20:31,3,4\n"
-    path = write_csv(tmp_path / "log.csv", text)
+    path = write_csv(tmp_path / "log.csv", "recorded,x_d,x\n10:20:30,1,2\n10:20:31,3,4\n")
     assert read_log(path).t.tolist() == [0.0, 1.0]
     assert read_log(path).remarks == ("column 'recorded' is read as the time; columns (--t) names another",)
     assert read_log(path, columns={"t": "recorded"}).remarks == ()

@@ -150,8 +150,7 @@ def test_what_the_compensator_section_leaves_out_is_the_predictors(tmp_path: Pat
     machine = load_machine(write(tmp_path, COMPENSATED + entries))
     given = {"Np": 30, "p": 20, "q": 9, "lambda": 1e-9, "t_init": 0.1, "preview": 180, "spacing": 3, "jerk_weight": 0.0}
     given |= {"no_reversal": False}
-    found = machine.fmi_compensator_parameters()
-    assert {name: found[name] for name in given} == given
+    assert {name: machine.fmi_compensator_parameters()[name] for name in given} == given
     changes = replace(machine.compensator_settings, preview=90, horizon=90, change_max=None, compensate="physics")
     compensator = machine.new_compensator(changes, predictor=replace(machine.compensator_predictor, p=10))
     settings = PredictorSettings(Np=30, p=10, q=9, lam=1e-9, T_s=0.001, t_init=0.1)
