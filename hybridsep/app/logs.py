@@ -66,7 +66,7 @@ def backtest(
     if figure is not None:
         from ..evaluate.figures import prediction_figure
     if report is not None:
-        from ..fitting.report import begun_report, write_findings
+        from ..fitting.sections import begun_report, write_findings
 
     axis = load_machine(machine, entries or ())
     saved = list(save or [])

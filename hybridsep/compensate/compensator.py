@@ -1,10 +1,10 @@
-"""Servo error pre-compensation (SEP) on the predictor's lifted model.
+"""Servo error pre-compensation (SEP): the modified command ``x_dm = x_d + δ`` with which ``x_h`` follows ``x_d``.
 
-Over a preview the predicted position is affine in the command, ``x_h = G_h x_dm + free`` (eq. (3)), so the
-modified command ``x_dm = x_d + δ`` that makes ``x_h`` follow ``x_d`` is a least-squares problem. ``δ`` is a sum of
-cubic B-splines, each filtered through the current model (the filtered-basis-functions method: Ramani, Duan, Okwudire
-and Ulsoy, J. Dyn. Sys. Meas. Control 139 (2017)), with limited preview (receding horizon): of a plan over ``preview``
-samples only the splines that begin in the first window are applied, then the next plan follows from new measurements.
+By the paper's model the position is affine in the command, ``x_h = G_h x_dm + free`` (eq. (3)), so this is a
+least-squares problem; by the averaged one it is solved in Newton steps (:mod:`~hybridsep.compensate.newton`). ``δ`` is
+a sum of cubic B-splines, each filtered through the current model (the filtered-basis-functions method: Ramani, Duan,
+Okwudire and Ulsoy, J. Dyn. Sys. Meas. Control 139 (2017)), with limited preview (receding horizon): of a plan only the
+splines that begin in the first window are applied, then the next plan follows from new measurements.
 
 Position, velocity and acceleration of ``δ`` are continuous by construction, also between windows and between models.
 Every spline ends within its plan, so a plan returns to ``x_d`` at its end, where its error counts least, and its

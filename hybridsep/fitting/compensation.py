@@ -26,7 +26,7 @@ _SCALE = 0.05
 """Velocity scale of what a compensator begins with, relative to the largest velocity of a log: with that of a log's
 first motion no stop operator is as short as friction before sliding. Mere predictions are 2 % worse with it."""
 
-_TRIED_MAX = 10_000  # leading samples on which a compensator is tried
+_COMPENSATED_MAX = 10_000  # leading samples on which a compensator is tried
 _EXPLAINED = 0.7  # share of the error that the physics model's compensation leaves, from which on it knows little
 
 
@@ -142,7 +142,7 @@ def expected_tracking(
     machine: Machine, recordings: Sequence[Recording], progress: Callable[[float], object]
 ) -> Tracking:
     """Return the tracking errors to be expected with and without a machine's compensator, and what its limits cost."""
-    allowed, first = machine.compensator_settings, beginnings(recordings, _TRIED_MAX)
+    allowed, first = machine.compensator_settings, beginnings(recordings, _COMPENSATED_MAX)
     settings = {model: replace(allowed, compensate=model) for model in ("physics", "hybrid")}
     with Trial.of(machine) as trial:
         judged = {model: _expected(trial, one, first) for model, one in settings.items()}

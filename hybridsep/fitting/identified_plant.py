@@ -29,7 +29,9 @@ from ..plants.stage_drive import StageDrive
 from .replay import Recording
 
 _FITTED = 2 / 3  # share of the training samples that the fit takes; the others choose
-_TRIED_MAX = 20_000  # most samples of the commands to try with: 20 s at 1 kHz, which a co-simulation takes seconds for
+_COMMANDS_MAX = (
+    20_000  # most samples of the commands to try with: 20 s at 1 kHz, which a co-simulation takes seconds for
+)
 
 _MODE_STEPS, _MODE_REACH = (0.1, 0.3, 0.05, 0.05), (1.0, 2.0, 1.0, 1.0)
 """Steps and bounds of a mode's changes: log f_n, log zeta, alpha/ω² and beta/ω."""
@@ -148,7 +150,9 @@ def commands_to_try(recordings: Sequence[Recording]) -> Array:
     distances = [float(np.abs(np.diff(one.x_d)).sum()) for one in recordings]
     found = recordings[distances.index(max(distances))].x_d
     moving = np.flatnonzero(np.diff(found))
-    found = found[max(int(moving[0]) - 100, 0) if len(moving) else 0 :][:_TRIED_MAX]  # with 100 samples of rest before
+    found = found[max(int(moving[0]) - 100, 0) if len(moving) else 0 :][
+        :_COMMANDS_MAX
+    ]  # with 100 samples of rest before
     steps = np.abs(np.diff(found))
     at_rest = np.flatnonzero(steps <= 1e-3 * steps.max(initial=0.0)) + 1
     last = int(at_rest[-1]) + 1 if len(at_rest) else 0

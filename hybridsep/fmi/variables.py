@@ -194,7 +194,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
     plan = (*ahead, *model)
     prediction = "prediction for now under x_dm, with averaging by its model, else by the model that planned the window"
     error = "predicted servo error x_d - x_h that is left"
-    state = "model that planned what x_dm follows now"
+    state = "model that planned what x_dm follows now; off, too, where the rest of an earlier plan is best"
     return [
         _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
         _position("x_meas", "input", "measured position now", start=0.0),

@@ -64,7 +64,7 @@ class Planner(Protocol):
     """Interface of a planner, which modifies the commands of a window before they are predicted; it can be saved."""
 
     predictor: HybridPredictor
-    preview: int  # samples of a plan, at least ``Np``
+    preview: int  # samples of the command that it knows ahead, at least ``Np``
     monitor: Monitor  # takes in each sample that is measured, before its window is updated
 
     def restart(self, start: float | None = None, *, t_init: float = 0.0, lead_in: int = 0) -> None:

@@ -38,7 +38,7 @@ HSEP_API void hsep_log(const hsep_instance *instance, hsep_category category, co
     instance->hand(instance, calls_status[place], calls_categories[place], text);
 }
 
-HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call)
+HSEP_API hsep_instance *hsep_instance_for(void *handle, const hsep_call *call)
 {
     hsep_instance *instance = handle;
     char legal[HSEP_MESSAGE_SIZE] = "";

@@ -44,12 +44,12 @@ HSEP_API hsep_instance *hsep_call_instantiate(
     const hsep_instance *filled, const char *name, const char *token, const char *resources, int logging_on);
 
 /* The instance if the call is legal now; otherwise NULL, and why not is logged. */
-HSEP_API hsep_instance *hsep_begin(void *handle, const hsep_call *call);
+HSEP_API hsep_instance *hsep_instance_for(void *handle, const hsep_call *call);
 
 /* Body of a version's function: it declares call and self, and does an action, a hsep_status, if the call is legal. */
 #define HSEP_DO(v, function, handle, action) \
     const hsep_call *call = HSEP_CALL(v, function); \
-    hsep_instance *self = hsep_begin(handle, call); \
+    hsep_instance *self = hsep_instance_for(handle, call); \
     return self != NULL && (action) != HSEP_REFUSED ? v##OK : v##Error
 
 /* Hand a message, formatted as printf does, to the importer's logger if its category is on. */
@@ -122,7 +122,7 @@ HSEP_API int hsep_values_integer(double number);
 /* Beginning of a version's function that gets or sets n variables: it declares call and self, or returns. */
 #define HSEP_ACCESS_OR_RETURN(v, function, handle, references, n, values, n_values) \
     const hsep_call *call = HSEP_CALL(v, function); \
-    hsep_instance *self = hsep_begin(handle, call); \
+    hsep_instance *self = hsep_instance_for(handle, call); \
     if (self == NULL || hsep_call_access(self, call, references, n, values, n_values) != HSEP_OK) { \
         return v##Error; \
     }

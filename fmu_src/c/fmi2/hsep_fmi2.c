@@ -215,7 +215,7 @@ fmi2Status fmi2GetDirectionalDerivative(
     fmi2Status fmi2##function(fmi2Component c, const fmi2StatusKind s, type *value) \
     { \
         const hsep_call *call = HSEP_CALL(fmi2, function); \
-        hsep_instance *self = hsep_begin(c, call); \
+        hsep_instance *self = hsep_instance_for(c, call); \
         (void)s; \
         if (self == NULL) { \
             return fmi2Error; \

@@ -160,7 +160,7 @@ fmi3Status fmi3DoStep(
     fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
 {
     const hsep_call *call = HSEP_CALL(fmi3, DoStep);
-    hsep_instance *self = hsep_begin(instance, call);
+    hsep_instance *self = hsep_instance_for(instance, call);
     (void)noSetFMUStatePriorToCurrentPoint;
     if (self == NULL) {
         return fmi3Error;

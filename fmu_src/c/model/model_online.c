@@ -26,7 +26,7 @@ typedef hsep_compensator online_block;
 typedef struct {
     hsep_clock clock;
     double x_d_ahead, x_meas, x_load; /* m */
-    double nothing;                   /* what follows the struct begins at a multiple of 16 bytes */
+    double padding;                   /* what follows the struct begins at a multiple of 16 bytes */
 } online_inputs;
 HSEP_ASSERT_WORDS(online_inputs, 9);
 
@@ -59,7 +59,7 @@ static void online_write_predicted(const hsep_predictor_outputs *outputs, double
 
 /* The model's own ---------------------------------------------------------------------------------------------------
  * online_check: of its settings together, each problem added to message. online_derive: its parameters, after all were
- * checked and the common ones read. online_tune: the tunable parameters, from the next window on. online_begin: after
+ * checked and the common ones read. online_tune: the tunable parameters, from when hsep.h says. online_begin: after
  * learned weights were loaded. online_x_load: the drive's load. online_sample: process a sample. */
 
 #if defined(HSEP_MODEL_HYBRID_PREDICTOR)
@@ -187,12 +187,12 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
     /* The model with averaging predicts from the beginning, with the noise that is assumed. */
     const double noise = hsep_uncertainty_first_variance(values[HSEP_VR_lambda], values[HSEP_VR_noise_std]);
-    const int predicts = values[HSEP_VR_averaging] > 0.0 && values[HSEP_VR_compensate] > 1.0;
+    const int predicts = values[HSEP_VR_averaging] > 0.0 && values[HSEP_VR_compensate] == HSEP_SEP_HYBRID;
     const double x_h_std = predicts && noise > 0.0 && noise < HUGE_VAL ? sqrt(noise) : 0.0;
     online_write_predicted(
         &(hsep_predictor_outputs){.x_d = start, .x_pb = start, .x_h = start, .x_h_std = x_h_std}, values);
     values[HSEP_VR_x_dm] = start;
-    values[HSEP_VR_sep_state] = values[HSEP_VR_compensate] > 0.0 ? 1.0 : 0.0;
+    values[HSEP_VR_sep_state] = values[HSEP_VR_compensate] > HSEP_SEP_OFF ? HSEP_SEP_PHYSICS : HSEP_SEP_OFF;
     values[HSEP_VR_rms_e] = values[HSEP_VR_no_measurement] = values[HSEP_VR_alarm] = 0.0;
 }
 

@@ -19,7 +19,7 @@ from hybridsep.base.threads import one_blas_thread
 from hybridsep.fitting.advice import Judged, advice_on
 from hybridsep.fitting.fit import fit
 from hybridsep.fitting.replay import Recording, Replay, replay
-from hybridsep.fitting.report import begun_report, write_findings
+from hybridsep.fitting.sections import begun_report, write_findings
 from hybridsep.logs.checks import Finding, checked, findings_table
 from hybridsep.logs.formats import open_source
 from hybridsep.machines.machine import Machine, check_unit, load_machine, machine_name

@@ -17,7 +17,7 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_p
     self->planner = hsep_take_block(&end, hsep_planner_lay_out(&(hsep_planner){0}, parameters));
     self->predictor = hsep_take_block(&end, hsep_predictor_lay_out(&(hsep_predictor){0}, parameters));
     if (parameters->averaging.averaging) {
-        self->averaged = hsep_take_block(&end, hsep_newton_lay_out(&(hsep_newton){0}, parameters));
+        self->newton = hsep_take_block(&end, hsep_newton_lay_out(&(hsep_newton){0}, parameters));
     }
     return end * sizeof(hsep_real);
 }
@@ -51,7 +51,7 @@ HSEP_API void hsep_compensator_block_init(
     for (hsep_int k = 0; k < parameters->horizon; k++) {
         spline[k] = hsep_physics_respond(trial, k < 4 * splines->spacing ? hsep_splines_shape(splines)[k] : 0.0);
     }
-    if (self->averaged) {
+    if (self->newton) {
         hsep_newton_init(hsep_compensator_newton(self), parameters, hsep_compensator_planner(self), spline);
     }
 }
@@ -167,7 +167,7 @@ static void compensator_publish(hsep_compensator *self, hsep_int last)
     if (!hsep_within(x_dm + first, last - first, HSEP_PREDICTION_MAX)) {
         predictor->divergence = HSEP_DIVERGES_X_DM;
     }
-    if (self->averaged) { /* the window's part of the preview, and what is late before it */
+    if (self->newton) { /* the window's part of the preview, and what is late before it */
         const hsep_newton *averaged = hsep_compensator_newton(self);
         hsep_copy(
             hsep_at(predictor, predictor->e_h), hsep_at_const(averaged, averaged->e_h) + (averaged->horizon - Np),
@@ -186,11 +186,11 @@ static void compensator_solve(hsep_compensator *self)
     const hsep_int pinned = compensator_pinned(self), i = predictor->k % predictor->Np;
     const hsep_int left = i < pinned ? pinned - i : 0; /* samples that follow the last plan, this one among them */
     int done = left <= 1;
-    if (self->averaged) { /* it is followed when it is due, so nothing depends on when it is made */
+    if (self->newton) { /* it is followed when it is due, so nothing depends on when it is made */
         const hsep_newton_task task = compensator_task(self);
         hsep_newton_run(hsep_compensator_newton(self), &task, left);
         self->state = done ? hsep_compensator_newton(self)->planned : self->state;
-    } else { /* halves of the solver's steps, all that are left of them in the last sample */
+    } else { /* an equal share of the solver's steps, in halves; where no sample is pinned all, -1 */
         const hsep_int due = left > 0 ? 2 * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
         done = 0;
         for (hsep_int half = 0; !done && half < due; half++) {
@@ -260,17 +260,17 @@ HSEP_API int hsep_compensator_change(
 
 HSEP_API void hsep_compensator_reset(hsep_compensator *self, int level)
 {
-    self->over = level && !self->was_reset ? 0 : self->over;
+    self->n_over = level && !self->was_reset ? 0 : self->n_over;
     self->was_reset = level != 0;
 }
 
 /* Whether no measurement came for so long that the change of the command fades. */
-static int compensator_lost(const hsep_compensator *self) { return self->n_lost > 0 && self->missing == self->n_lost; }
+static int compensator_lost(const hsep_compensator *self) { return self->n_lost && self->n_missing == self->n_lost; }
 
 HSEP_API void hsep_compensator_begin(hsep_compensator *self)
 {
     hsep_planner *planner = hsep_compensator_planner(self);
-    self->compensate = compensator_lost(self) || self->over == HSEP_OVER ? HSEP_SEP_OFF : self->compensate_next;
+    self->compensate = compensator_lost(self) || self->n_over == HSEP_N_OVER ? HSEP_SEP_OFF : self->compensate_next;
     if (hsep_planner_splines(planner)->share[0] != 1.0 / self->change_max_next) {
         hsep_splines_limit(hsep_part(planner, planner->splines), 0, self->change_max_next);
     }
@@ -281,13 +281,13 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
     for (hsep_int k = predictor->preview; k < compensator_horizon(self); k++) { /* it goes on at its last velocity */
         x_d[k] = x_d[last] + (x_d[last] - x_d[last - 1]) * (hsep_real)(k - last);
     }
-    if (self->averaged) { /* which model planned is known when the plan is made */
+    if (self->newton) { /* which model planned is known when the plan is made */
         const hsep_newton_task task = compensator_task(self);
         self->before = self->state;
         predictor->n_physics = hsep_predictor_warm_up(predictor, 0);
         hsep_newton_begin(hsep_compensator_newton(self), &task, self->compensate);
     }
-    const int solving = self->averaged || compensator_plan(self);
+    const int solving = self->newton || compensator_plan(self);
     if (!solving) {
         hsep_planner_carry_out(planner, x_d);
     }
@@ -302,16 +302,16 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
 static int compensator_monitor(hsep_compensator *self, hsep_real error, hsep_real change)
 {
     if (isnan(error)) {
-        self->missing += self->missing < self->n_lost;
+        self->n_missing += self->n_missing < self->n_lost;
         return 1;
     }
-    self->missing = 0;
-    if (self->over < HSEP_OVER) {
+    self->n_missing = 0;
+    if (self->n_over < HSEP_N_OVER) {
         const hsep_real most = self->error_max * self->error_max;
         const hsep_real square = hsep_fmax(error * error, error * (error - change));
-        self->over = most > 0.0 && square > most ? self->over + 1 : 0;
+        self->n_over = most > 0.0 && square > most ? self->n_over + 1 : 0;
     }
-    return self->over == 0;
+    return self->n_over == 0;
 }
 
 HSEP_API void hsep_compensator_load(hsep_compensator *self, hsep_real x_load) { self->x_load = x_load; }
@@ -339,7 +339,7 @@ HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d) - predictor->late;
     hsep_real *x_dm = hsep_at(self, self->x_dm) - predictor->late;
     const hsep_real error = (predictor->early ? predictor->next : x_meas) - x_d[i];
-    const int is_sound = compensator_monitor(self, error, x_dm[i] - x_d[i]) || !self->averaged;
+    const int is_sound = compensator_monitor(self, error, x_dm[i] - x_d[i]) || !self->newton;
     if (hsep_predictor_take_in(predictor, x_d_ahead, x_meas, is_sound)) {
         hsep_predictor_finish(predictor);
         hsep_copy(x_dm, x_dm + predictor->Np, predictor->late);
@@ -358,13 +358,13 @@ HSEP_API void hsep_compensator_read(const hsep_compensator *self, hsep_compensat
 {
     const hsep_predictor *predictor = hsep_part_const(self, self->predictor);
     const hsep_int i = predictor->k % predictor->Np;
-    const int follows = self->averaged && i < hsep_planner_pinned(hsep_part_const(self, self->planner));
+    const int follows = self->newton && i < hsep_planner_pinned(hsep_part_const(self, self->planner));
     hsep_predictor_read(predictor, &outputs->predicted);
-    if (!self->averaged && self->state != HSEP_SEP_HYBRID) {
+    if (!self->newton && self->state != HSEP_SEP_HYBRID) {
         outputs->predicted.x_h_std = 0.0; /* of x_pb it is not known */
     }
     outputs->x_dm = hsep_at_const(self, self->x_dm)[i];
-    outputs->alarm = self->over == HSEP_OVER;
+    outputs->alarm = self->n_over == HSEP_N_OVER;
     outputs->state = outputs->alarm ? HSEP_SEP_TRIPPED : (hsep_sep_state)(follows ? self->before : self->state);
     outputs->no_measurement = compensator_lost(self);
 }

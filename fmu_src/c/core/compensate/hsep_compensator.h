@@ -3,11 +3,11 @@
  *
  * A window is planned in the sample in which it is predicted. A plan that the drive's limits bound is solved over the
  * samples that follow, while the command follows the last plan. With averaging every plan is solved so, over
- * HSEP_PLANNING_PINNED_AVERAGED samples (hsep_newton_run).
+ * HSEP_PLANNING_PINNED_AVERAGED samples at most (hsep_newton_run).
  *
  * A sample costs what hsep_predictor.h says, and an equal share of a plan where it follows the last one; without
- * averaging more where fewer than 8 do (Np < 16, or spacing > 8), or all of it at once. It is bounded by the
- * parameters; 1000 splines in a plan are far from real time.
+ * averaging more where fewer than 8 do (Np < 16, or spacing does not divide 8), or all of it at once. It is bounded by
+ * the parameters; 1000 splines in a plan are far from real time.
  *
  * Once the parameters are in range nothing here fails but the prediction of a window, as in hsep_predictor.h.
  */
@@ -20,7 +20,7 @@
 #include "hsep_newton.h"
 
 /* Samples in a row above the largest following error that trip, but for missing ones: one or two may be outliers. */
-#define HSEP_OVER 3
+#define HSEP_N_OVER 3
 
 struct hsep_compensator {
     hsep_int compensate;       /* hsep_sep_state, the best model allowed in the window, */
@@ -28,10 +28,10 @@ struct hsep_compensator {
     hsep_real change_max_next; /* m, of the command, likewise */
     hsep_int state;            /* hsep_sep_state of the window, */
     hsep_int before;           /* and of the window before, whose plan the first samples follow with averaging */
-    hsep_int n_lost;           /* as the parameter */
-    hsep_int missing;          /* measurements that were missing one after another, n_lost at most */
+    hsep_int n_lost;           /* samples without a measurement after which it is lost; 0: never */
+    hsep_int n_missing;        /* measurements that were missing one after another, n_lost at most */
     hsep_real error_max;       /* m, largest following error; 0: none */
-    hsep_int over;             /* samples above it one after another, HSEP_OVER at most: it has tripped */
+    hsep_int n_over;           /* samples above it one after another, HSEP_N_OVER at most: it has tripped */
     hsep_int was_reset;        /* last level of the reset */
     hsep_real x_load;          /* m, load that a sample brings, */
     hsep_real first_load;      /* and that of the first sample, from which it counts, as positions do from the start */
@@ -44,7 +44,7 @@ struct hsep_compensator {
     hsep_int spline_pb; /* (horizon,) m/m, a spline filtered by the physics model */
     hsep_int trial;     /* the physics model of a trial */
     hsep_int planner, predictor;
-    hsep_int averaged; /* the planner on the residual model with averaging; 0: the paper's */
+    hsep_int newton; /* the planner on the residual model with averaging; 0: the paper's */
 };
 HSEP_ASSERT_WORDS(hsep_compensator, 23);
 
@@ -61,9 +61,9 @@ static inline hsep_predictor *hsep_compensator_predictor(hsep_compensator *self)
     return hsep_part(self, self->predictor);
 }
 static inline hsep_planner *hsep_compensator_planner(hsep_compensator *self) { return hsep_part(self, self->planner); }
-static inline hsep_newton *hsep_compensator_newton(hsep_compensator *self) { return hsep_part(self, self->averaged); }
+static inline hsep_newton *hsep_compensator_newton(hsep_compensator *self) { return hsep_part(self, self->newton); }
 
-/* Plan the first window. */
+/* Begin a window: plan it, or begin to. */
 HSEP_API void hsep_compensator_begin(hsep_compensator *self);
 
 #endif

@@ -22,7 +22,7 @@ HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_p
     self->m = knots.m;
     const int few = (n - knots.n) * spacing < HSEP_NEWTON_TWICE;
     self->n_steps = few ? 1 : HSEP_NEWTON_THRICE * self->Np <= self->horizon ? 2 : 3;
-    self->rest = hsep_take(&end, coefficients);
+    self->remainder = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
     self->of_physics = hsep_take(&end, coefficients);
     self->command = hsep_take(&end, all);
@@ -69,7 +69,7 @@ static void newton_command(hsep_newton *self, const hsep_newton_task *task, cons
 static int newton_outgrows(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_int n = self->horizon + self->late;
-    newton_command(self, task, hsep_at(self, self->rest), 0);
+    newton_command(self, task, hsep_at(self, self->remainder), 0);
     const hsep_real of_command = hsep_largest_step(hsep_at(self, self->command), n);
     const hsep_real of_model = hsep_largest_step(hsep_at(self, self->x_pb), n);
     return !(hsep_fmin(of_command, of_model) <= HSEP_PLANNING_FASTER * task->model->learned.fastest);
@@ -268,19 +268,19 @@ static void newton_take(hsep_newton *self, const hsep_planner *planner)
     const hsep_int window = self->Np / hsep_planner_splines(planner)->spacing, first = planner->n_pinned;
     const hsep_int count = hsep_min(HSEP_PLANNING_NEAR * window, self->n) - first;
     hsep_real *best = hsep_at(self, self->best) + HSEP_N_DECIDED, *corrected = hsep_at(self, self->corrected);
-    const hsep_real *rest = hsep_at(self, self->rest) + HSEP_N_DECIDED;
+    const hsep_real *remainder = hsep_at(self, self->remainder) + HSEP_N_DECIDED;
     const hsep_real *before = corrected + first, *now = best + first;
-    hsep_axpy(best, -1.0, rest, self->n); /* the change */
+    hsep_axpy(best, -1.0, remainder, self->n); /* the change */
     const hsep_real size = hsep_sqrt(hsep_dot(now, now, count)) * hsep_sqrt(hsep_dot(before, before, count));
     const hsep_real cosine = size > 0.0 ? hsep_dot(now, before, count) / size : 0.0;
     self->share = hsep_fmax(self->share * (1.0 + HSEP_PLANNING_TAKEN_BACK * cosine), HSEP_PLANNING_LEAST_SHARE);
     self->share = hsep_fmin(self->share, 1.0);
-    const hsep_real gain = self->cost_of_rest - self->cost;
+    const hsep_real gain = self->cost_of_remainder - self->cost;
     const hsep_real left = gain > 0.0 ? 1.0 / (1.0 + HSEP_PLANNING_DOUBT * self->doubt / gain) : 0.0;
     const hsep_real share = left > 0.0 ? self->share * left : 0.0; /* not NaN */
     for (hsep_int i = 0; i < self->n; i++) {
         corrected[i] = share * best[i];
-        best[i] = rest[i] + corrected[i];
+        best[i] = remainder[i] + corrected[i];
     }
 }
 
@@ -288,10 +288,10 @@ static void newton_take(hsep_newton *self, const hsep_planner *planner)
 static void newton_compare(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real of_physics = newton_cost(self, task, hsep_at(self, self->of_physics));
-    const int is_last = newton_better(self->cost_of_rest, of_physics);
-    hsep_int plan = is_last ? self->rest : self->of_physics;
+    const int is_last = newton_better(self->cost_of_remainder, of_physics);
+    hsep_int plan = is_last ? self->remainder : self->of_physics;
     self->planned = !is_last;
-    if (self->follows && newton_better(self->cost, of_physics)) {
+    if (self->may_plan && newton_better(self->cost, of_physics)) {
         newton_take(self, task->planner);
         plan = self->best;
         self->planned = 2;
@@ -331,8 +331,8 @@ static hsep_int newton_of_columns(hsep_newton *self, const hsep_newton_task *tas
            (begins ? NEWTON_SOME : 0);
 }
 
-/* What all parts of the longest plan count as, samples of whose window are predicted already. A second length of a
- * Newton step, rarely tried, adds a prediction where it is, and so does what begins after it. */
+/* What all yields of newton_go_on count as in the longest plan, samples of whose window are predicted already. A second
+ * length of a Newton step, rarely tried, adds a prediction where it is, and so does what begins after it. */
 static hsep_int newton_of_plan(hsep_newton *self, const hsep_newton_task *task, hsep_int predicted)
 {
     const hsep_int window = self->late + self->Np, beyond = self->horizon - self->Np;
@@ -414,7 +414,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
     const hsep_int all = self->late + self->horizon;
     const hsep_int straight = self->n_steps > 2 ? self->horizon / HSEP_PLANNING_STRAIGHT : 0;
     hsep_planner *planner = task->planner;
-    hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
+    hsep_real *c = hsep_planner_coefficients(planner), *remainder = hsep_at(self, self->remainder);
     hsep_real *of_physics = hsep_at(self, self->of_physics), *corrected = hsep_at(self, self->corrected);
     const hsep_int kept = self->Np / hsep_planner_splines(planner)->spacing;
 
@@ -424,7 +424,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         hsep_averaged_weigh(task->model, HSEP_OF_PLANS, hsep_at(self, self->e_h), self->samples);
         if (self->judges) {
             NEWTON_VARY(1, all)
-            self->cost = newton_cost(self, task, rest);
+            self->cost = newton_cost(self, task, remainder);
             self->doubt = newton_doubt(self, task);
         }
         hsep_averaged_keep_ahead(task->model, self->judges > 0);
@@ -433,29 +433,29 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
         if (self->planned) {
             NEWTON_YIELD(2, NEWTON_PREDICTION);
             newton_open(self, task);
-            NEWTON_SOLVE(3, 4, self->follows ? HSEP_NEWTON_PHYSICS_STEPS : planner->steps);
+            NEWTON_SOLVE(3, 4, self->may_plan ? HSEP_NEWTON_PHYSICS_STEPS : planner->steps);
             self->planned = self->status == HSEP_PLAN_DONE;
         }
         newton_copy(self, of_physics, c);
         self->judges = self->judges && self->planned;
-        self->follows = self->follows && self->planned;
+        self->may_plan = self->may_plan && self->planned;
         /* What the last plan changed, as far as it is in its remainder, which this plan may change */
         hsep_copy(corrected, corrected + kept, self->n - kept);
-        hsep_zero(self->follows ? corrected + (self->n - kept) : corrected, self->follows ? kept : self->n);
+        hsep_zero(self->may_plan ? corrected + (self->n - kept) : corrected, self->may_plan ? kept : self->n);
 
         /* In place of the remainder of the last plan one that ends compensation, where it is off */
-        self->cost_of_rest = self->cost;
+        self->cost_of_remainder = self->cost;
         if (self->ends) {
-            newton_copy(self, c, rest);
+            newton_copy(self, c, remainder);
             NEWTON_YIELD(5, NEWTON_PREDICTION);
             hsep_planner_end(planner, task->x_d);
             NEWTON_SOLVE(6, 7, planner->steps);
         }
 
         /* Newton steps, the first from the remainder of the last plan, each from the best plan so far */
-        newton_copy(self, hsep_at(self, self->best), rest);
+        newton_copy(self, hsep_at(self, self->best), remainder);
         self->gains = 1;
-        for (self->steps = 0; self->follows && self->steps < self->n_steps; self->steps++) {
+        for (self->steps = 0; self->may_plan && self->steps < self->n_steps; self->steps++) {
             if (!self->gains) { /* what was predicted last was no better */
                 self->left += 2 * NEWTON_PREDICTION;
                 NEWTON_PREDICT(8, 9, hsep_at(self, self->best));
@@ -518,13 +518,13 @@ HSEP_API void hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, h
     self->left -= hsep_min(done, self->left);
 }
 
-HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int best)
+HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int allowed)
 {
     const hsep_predictor *predictor = task->predictor;
     const hsep_real *residuals = hsep_at_const(predictor, predictor->past_e) + predictor->n; /* last ones measured */
-    hsep_real *path = hsep_at(self, self->target), *rest = hsep_at(self, self->rest);
+    hsep_real *path = hsep_at(self, self->target), *remainder = hsep_at(self, self->remainder);
     self->place = 0;
-    newton_copy(self, rest, hsep_planner_coefficients(task->planner));
+    newton_copy(self, remainder, hsep_planner_coefficients(task->planner));
     hsep_copy(hsep_at(self, self->physics), hsep_at_const(predictor, predictor->physics), self->trial - self->physics);
     hsep_copy(
         hsep_at(self, self->command) + self->horizon, hsep_at_const(predictor, predictor->command) + self->Np,
@@ -536,17 +536,17 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
         path[self->horizon - 1 - k] = task->x_d[k] - task->predictor->start;
     }
     self->bound = newton_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
-    newton_command(self, task, rest, HSEP_N_DECIDED + self->n);
+    newton_command(self, task, remainder, HSEP_N_DECIDED + self->n);
     const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->samples = self->late + (pinned > 0 ? pinned : 1);
     hsep_averaged_forecast(
         task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->horizon,
         hsep_at(self, self->e_h), self->samples);
-    self->ends = best == 0 && self->planned > 0;
-    self->planned = best > 0;
-    self->is_physics = best == 1;
+    self->ends = allowed == 0 && self->planned > 0;
+    self->planned = allowed > 0;
+    self->is_physics = allowed == 1;
     self->judges = self->planned && (hsep_real)predictor->k >= predictor->n_init && task->model->predicted[HSEP_STATIC];
-    self->follows = self->judges && best > 1;
+    self->may_plan = self->judges && allowed > 1;
     /* This sample has begun, and learned the last window */
     self->next = 4 * NEWTON_PASS + NEWTON_SOME * newton_parts(self->samples, HSEP_NEWTON_VARIED);
     self->left = self->next + newton_of_plan(self, task, self->samples);

@@ -112,6 +112,6 @@ HSEP_API hsep_predictor_parameters hsep_compensator_derive(const hsep_parameters
     derived.n_lost = (hsep_int)parameters_samples(settings->measurement_timeout, T_s);
     /* The warm-up counts from the end of the first fill; without one, what is known plans the first window. */
     derived.n_init = parameters_samples(t_init > 0.0 ? t_init + (hsep_real)preview * T_s : 0.0, T_s);
-    derived.planned = 1;
+    derived.compensates = 1;
     return derived;
 }

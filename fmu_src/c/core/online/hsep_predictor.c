@@ -29,11 +29,11 @@ HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predi
     self->x_pb = predictor_take(&end, late, Np);
     self->x_h = predictor_take(&end, late, Np);
     self->x_hold = predictor_take(&end, late, Np);
-    self->ahead_pb = hsep_take(&end, parameters->planned ? 0.0 : Np);
+    self->ahead_pb = hsep_take(&end, parameters->compensates ? 0.0 : Np);
     self->command = hsep_take(&end, n);
     self->past_x = hsep_take(&end, n + q);
     self->past_e = hsep_take(&end, n + p);
-    self->e_h = parameters->planned ? hsep_take(&end, n + p) : self->past_e;
+    self->e_h = parameters->compensates ? hsep_take(&end, n + p) : self->past_e;
     self->physics = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, parameters));
     self->uncertainty = hsep_take_block(&end, hsep_uncertainty_lay_out(&(hsep_uncertainty){0}, self->Np, self->n));
     if (parameters->averaging.averaging) {
@@ -41,7 +41,7 @@ HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predi
     } else {
         self->paper = hsep_take_block(&end, hsep_paper_lay_out(&(hsep_paper){0}, &parameters->settings));
     }
-    if (parameters->averaging.averaging && !parameters->planned) { /* the state at the run's beginning is corrected */
+    if (parameters->averaging.averaging && !parameters->compensates) { /* the run's first state is corrected */
         self->motion = hsep_take_block(&end, hsep_start_lay_out(&(hsep_start){0}, parameters));
     }
     return end * sizeof(hsep_real);
@@ -98,26 +98,26 @@ static void predictor_learn(hsep_predictor *self, hsep_int i, hsep_real measured
     }
 }
 
-HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real measured, int is_sound)
+HSEP_API int hsep_predictor_take_in(hsep_predictor *self, hsep_real x_d_ahead, hsep_real x_meas, int is_sound)
 {
-    const hsep_real x_meas = self->early ? self->next : measured, learned = is_sound ? x_meas : NAN;
+    const hsep_real measured = self->early ? self->next : x_meas, learned = is_sound ? measured : NAN;
     const hsep_int i = self->k % self->Np, j = self->n - 1 - i, late = self->late;
-    self->next = measured;
-    /* x_meas was measured late samples ago. */
+    self->next = x_meas;
+    /* It was measured late samples ago. */
     const hsep_real x_d = hsep_at(self, self->x_d - late)[i], x_pb = hsep_at(self, self->x_pb - late)[i];
     const hsep_real x_h = hsep_at(self, self->x_h - late)[i], x_hold = hsep_at(self, self->x_hold - late)[i];
     hsep_at(self, self->ahead)[self->k % self->preview] = x_d_ahead;
     hsep_at(self, self->past_e)[j] = learned - self->start - hsep_at(self, self->past_x)[j]; /* e_pb = x - x_pb */
     predictor_learn(self, i, learned, x_d_ahead);
-    if (self->k >= self->preview + late && !isnan(x_meas)) {
-        self->residual = x_meas - x_pb;
+    if (self->k >= self->preview + late && !isnan(measured)) {
+        self->residual = measured - x_pb;
     }
-    if (self->k >= self->preview + late && (hsep_real)self->k >= self->n_init + (hsep_real)late && !isnan(x_meas)) {
+    if (self->k >= self->preview + late && (hsep_real)self->k >= self->n_init + (hsep_real)late && !isnan(measured)) {
         self->n_measured++;
-        self->sum_e += (x_meas - x_d) * (x_meas - x_d);
-        self->sum_pb += (x_meas - x_pb) * (x_meas - x_pb);
-        self->sum_h += (x_meas - x_h) * (x_meas - x_h);
-        self->sum_hold += (x_meas - x_hold) * (x_meas - x_hold);
+        self->sum_e += (measured - x_d) * (measured - x_d);
+        self->sum_pb += (measured - x_pb) * (measured - x_pb);
+        self->sum_h += (measured - x_h) * (measured - x_h);
+        self->sum_hold += (measured - x_hold) * (measured - x_hold);
     }
     self->k++;
     return i + 1 == self->Np;
@@ -152,8 +152,8 @@ HSEP_API void hsep_predictor_finish(hsep_predictor *self)
     if (self->motion && self->k == self->preview + self->Np) {
         predictor_start(self);
     }
-    const int planned = self->e_h != self->past_e; /* a first fill that was planned is what was before */
-    if (averaged != NULL && (self->learning || planned)) {
+    const int compensates = self->e_h != self->past_e; /* a compensator plans the first fill: it is what was before */
+    if (averaged != NULL && (self->learning || compensates)) {
         hsep_averaged_learn(
             averaged, hsep_at(self, self->command) + late, past_x + late, past_e + late, self->learning != 0);
     }

@@ -7,7 +7,7 @@
  *
  * hsep_predictor_sample, preview = Np, predicts under the commands as they came. A compensator, which decides
  * the commands of a window, calls the parts in this order: hsep_predictor_take_in at each sample; at the end of a
- * window hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_publish.
+ * window hsep_predictor_finish and _begin; once commands are decided, hsep_predictor_predict, _publish, _predict_std.
  *
  * Cost of a sample, at any sample number: hsep_regression_fold and hsep_physics_respond; at the end of a window also
  * hsep_regression_solve and hsep_recursion_run. With averaging two hsep_gram_fold, before the end of a window a share

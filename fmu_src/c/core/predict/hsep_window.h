@@ -15,7 +15,7 @@ typedef struct {
     hsep_int horizon;       /* samples that are predicted, >= preview, in a compensator's plan; else Np */
     hsep_int n_lost;        /* samples without a measurement after which a compensator's change fades; 0: never */
     hsep_real n_init;       /* samples of warm-up from the beginning; whole, >= 0 */
-    int planned;            /* whether a compensator decides the commands of a window when it begins */
+    int compensates;        /* whether a compensator decides the commands of a window when it begins */
     hsep_int n_modes;       /* >= 1 */
     const hsep_mode *modes; /* (n_modes,) */
 } hsep_predictor_parameters;

@@ -53,7 +53,7 @@ HSEP_API hsep_real hsep_averaged_lay_out(hsep_averaged *self, const hsep_predict
     self->e_0 = hsep_take(&end, Np + p_of_command);
     self->stacked = hsep_take(&end, HSEP_N_EXPERTS * n);
     const hsep_int half = (self->n - self->late) / (2 * self->Np);
-    self->n_ahead = !parameters->planned ? 0 : half > 0 ? half : 1;
+    self->n_ahead = !parameters->compensates ? 0 : half > 0 ? half : 1;
     self->ahead = hsep_take(&end, (hsep_real)self->n_ahead * HSEP_N_EXPERTS * Np);
     self->recalled = hsep_take(&end, n);
     self->e_h = hsep_take(&end, n);

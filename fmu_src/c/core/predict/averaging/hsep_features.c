@@ -17,7 +17,7 @@ HSEP_API hsep_real hsep_disturbances_lay_out(hsep_disturbances *self, const hsep
     self->period = parameters->averaging.period;
     self->n = hsep_disturbances_n(parameters);
     self->n_linear = self->n - 2 * count;
-    self->of_motion = parameters->planned != 0;
+    self->of_motion = parameters->compensates != 0;
     self->T_s = parameters->settings.T_s;
     self->filters = hsep_take_block(&end, 2.0 * (hsep_real)count * filter);
     self->filter_words = (hsep_int)(filter / sizeof(hsep_real));

@@ -56,7 +56,7 @@ static inline hsep_real hsep_recall_lay_out(hsep_recall *self, const hsep_predic
     self->n = self->lag = hsep_predicted(parameters);
     self->stride = self->Np > HSEP_RECALL_UPDATES ? self->Np / HSEP_RECALL_UPDATES : 1;
     self->fading = hsep_exp(-(hsep_real)self->stride / (hsep_real)self->n);
-    self->same = parameters->planned ? HSEP_RECALL_SAME : 0.0;
+    self->same = parameters->compensates ? HSEP_RECALL_SAME : 0.0;
     self->commands = hsep_take(&end, (hsep_real)self->stride);
     self->changes = hsep_take(&end, (hsep_real)(self->size + self->stride));
     self->residuals = hsep_take(&end, (hsep_real)self->size);
