@@ -12,7 +12,16 @@ from ..base.signals import Array
 from ..logs.units import DisplayUnits
 from ..machines.machine import Machine, machine_from_table
 from ..model.physics import ModalModel
-from .uncertainty import Estimate
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimated parameter."""
+
+    name: str
+    value: float  # in ``unit``, as its deviation
+    std: float  # standard deviation; 0 for a parameter that was not estimated
+    unit: str
 
 
 @dataclass(frozen=True)

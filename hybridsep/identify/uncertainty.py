@@ -7,25 +7,15 @@ deviation with all parameters free.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.signals import Array
+from .model import Estimate
 from .output_error import Fit, Problem, Segment, simulated, without
 
 _BATCHES = 30  # batches of the residual: enough for a variance, and each long beside a servo's memory
 _STEP = 1e-5  # relative step of the differences in the delta method
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """Estimated parameter."""
-
-    name: str
-    value: float  # in ``unit``, as its deviation
-    std: float  # standard deviation; 0 for a parameter that was not estimated
-    unit: str
 
 
 def estimates(fit: Fit, segments: Sequence[Segment], T_s: float, unit: str = "m") -> tuple[tuple[Estimate, ...], float]:

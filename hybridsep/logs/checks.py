@@ -42,7 +42,7 @@ _GAINS, _KNOWN = (0.1, 5.0), 0.03
 """Gains beyond which no position loop is: a small servo under load was recorded at 0.25; and relative distance from the
 ratio of two units within which it is meant."""
 
-_TRAVEL_MAX, _ACCELERATION_MAX, _ACCELERATION_MIN, _OVER = 20.0, 500.0, 1e-3, 10
+_TRAVEL_MAX, _ACCELERATION_MAX, _ACCELERATION_MIN, _OVER = 20.0, 500.0, 1e-4, 10
 """Largest travel, m, and acceleration, m/s² over this many samples, of a linear axis that states no unit; and the least
 one, m/s² or rad/s², of an axis that follows a second late, whose times state none: these may be in ms."""
 

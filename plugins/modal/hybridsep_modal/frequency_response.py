@@ -15,9 +15,8 @@ from hybridsep.base.errors import IdentificationError, ParameterError
 from hybridsep.base.settings import check
 from hybridsep.base.signals import Array
 from hybridsep.base.threads import one_blas_thread
-from hybridsep.identify.model import machine_of
+from hybridsep.identify.model import Estimate, machine_of
 from hybridsep.identify.selection import slow_parts
-from hybridsep.identify.uncertainty import Estimate
 from hybridsep.machines.machine import Machine
 from hybridsep.model.physics import ModalModel
 

@@ -15,7 +15,7 @@ from scipy.signal import welch
 
 from hybridsep.base.errors import IdentificationError, LogError
 from hybridsep.base.signals import Array
-from hybridsep.identify.uncertainty import Estimate
+from hybridsep.identify.model import Estimate
 from hybridsep.model.physics import ModalModel, Mode
 
 from .frequency_response import IdentifiedResponse
