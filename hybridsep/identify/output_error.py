@@ -277,8 +277,7 @@ def affine(structure: Structure, columns: Array, y: Array) -> tuple[Array, Array
     if not structure.unit_gain:
         return columns, y
     n = max(structure.n_modes + structure.lag, 1)
-    first = columns[:, :1]
-    return np.hstack((columns[:, 1:n] - first, columns[:, n:])), y - columns[:, 0]
+    return np.hstack((columns[:, 1:n] - columns[:, :1], columns[:, n:])), y - columns[:, 0]
 
 
 def fit_structure(
