@@ -1,6 +1,7 @@
 """Benchmark of the following-error monitor: native compensators whose sensor or drive fails, and sound ones.
 
     python -m benchmarks.faults [--n 40] [--seed 51] [--sound 300] [--without]      (ten minutes, one process)
+    python -m benchmarks.faults --only saturated --force 1.15
 
 Drives of two masses at up to 2 kHz, cold and hybrid; the fault begins in motion after 0.4 of a run, or with it, and
 lasts until its end. RMS and largest error of the true position from the fault on, relative to the drive without
@@ -12,10 +13,12 @@ import argparse
 import math
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import count, islice
 from pathlib import Path
 
 import numpy as np
+from two_mass.axis import Axis
 from two_mass.generator import Recipe
 from two_mass.plant import TwoMassDrive
 
@@ -59,12 +62,21 @@ def in_motion(x_d: Array) -> int:
     return first + int(np.argmax(velocity[first:] >= velocity.max() / 2))
 
 
-def judged(recipe: Recipe, name: str, monitored: bool) -> tuple[float, float, float, bool]:
+def asked_for(axis: Axis, x_d: Array) -> float:
+    """Return the largest force that a drive asks of its motor without compensation, N/kg, static friction included."""
+    drive, forces = TwoMassDrive(axis, float(x_d[0])), [0.0]
+    for command in x_d.tolist():
+        drive.step(command)
+        forces.append(drive._drive[-9])  # the state FORCE of drive.c
+    return largest(np.array(forces))
+
+
+def judged(recipe: Recipe, name: str, monitored: bool, force: float = 0.0) -> tuple[float, float, float, bool]:
     """Return RMS and largest error relative to no compensation, ms until a trip (inf: none), and if it was false."""
     machine, x_d, axis = machine_of_drive(recipe), trajectory(recipe), recipe.axis
     first = 0 if name in AT_ONCE else in_motion(x_d)
     if name in DRIVES:
-        axis = CONDITIONS[DRIVES[name]](axis, x_d)
+        axis = replace(axis, force_max=force * asked_for(axis, x_d)) if force else CONDITIONS[DRIVES[name]](axis, x_d)
         first = min(first, round(CHANGE * len(x_d)))
     fault, held, end = SENSORS.get(name), 0.0, first + round(1.0 / axis.T_s) if "1 s" in name else len(x_d)
 
@@ -96,6 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--sound", type=int, default=300, help="number of sound drives")
     parser.add_argument("--only", default="", help="only the faults whose name has this text")
     parser.add_argument("--without", action="store_true", help="without the monitor")
+    parser.add_argument("--force", type=float, default=0.0, help="of saturated motors, in what drives ask for")
     chosen = parser.parse_args(arguments)
     recipes = list(islice(drives(chosen.seed), max(chosen.n, chosen.sound)))
     print(f"{'':14}{'RMS':^25}{'largest error':^25}{'trips':^33}")
@@ -105,7 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if chosen.only not in name:
             continue
         n = chosen.sound if name == "sound" else chosen.n
-        found = np.array([judged(recipe, name, not chosen.without) for recipe in recipes[:n]])
+        found = np.array([judged(recipe, name, not chosen.without, chosen.force) for recipe in recipes[:n]])
         cells = []
         for ratios, most in zip(found.T[:2], (HARMED, PEAK), strict=True):
             harmed = int(np.sum(~(ratios <= most)))

@@ -95,7 +95,7 @@ def closed_loop(
     return cosimulate(fmu, drive, x_d, controller_values=values, sensor=measured)
 
 
-SATURATED = 0.6  # motor force beyond friction, relative to that which the trajectory needs
+SATURATED = 0.6  # motor force beyond sliding friction, relative to what the trajectory's acceleration needs
 RINGING = 0.015  # damping ratio of the mode that begins to ring
 CHANGE = 0.4  # part of a run after which the plant changes, or, in other benchmarks, the measurement fails
 

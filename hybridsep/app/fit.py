@@ -81,7 +81,7 @@ def fit(
     machine = checked_name(name) if name else machine_name(logs[0], reading.axis)
     inputs: dict[str, str | Path | None] = {f"log {path.name}": path for path in logs}
     check_outputs((), inputs)
-    numbers = _parsed(p, _numbers, "--p must be whole numbers with commas") or []
+    numbers = _parsed(p, lambda text: list(map(int, text.split(","))), "--p must be whole numbers with commas") or []
     lags = [PARAMETERS["p"].checked(one, "--p") for one in numbers]
     ahead = _parsed(look_ahead, _seconds, "--look-ahead must be a time with its unit, such as 60ms or 0.06s")
     gains = _parsed(cascade, _gains, "--cascade must be NAME=VALUE with commas, each a number")
@@ -121,10 +121,6 @@ def _parsed(text: str | None, parse: Callable[[str], _Parsed], must: str) -> _Pa
         return None if text is None else parse(text)
     except ValueError:
         raise ParameterError(f"{must}, got {text!r}") from None
-
-
-def _numbers(text: str) -> list[int]:
-    return list(map(int, text.split(",")))
 
 
 def _gains(text: str) -> dict[str, float]:

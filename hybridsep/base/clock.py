@@ -61,8 +61,7 @@ class SampleClock(NamedTuple):
             since, carry = _take(since, carry, -1, T_s)
         reached = n > 0 and since <= delta  # the instant is at this point, and belongs to the next step
         after = SampleClock(T_s, self.k + n, *((0.0, 0.0) if reached else (since, carry)), end)
-        n_latched = n + after.latched - self.latched
-        return ClockStep(after, n, n_latched, T_s - self.since if self.latched else 0.0)
+        return ClockStep(after, n, n + after.latched - self.latched, T_s - self.since if self.latched else 0.0)
 
 
 class ClockStep(NamedTuple):

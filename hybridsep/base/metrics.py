@@ -106,8 +106,7 @@ def hold(x_pb: Array, x_meas: Array, active: NDArray[np.bool_], Np: int, *, late
     measured = np.maximum.accumulate(np.where(np.isnan(x_meas), -1, samples))
     begin = samples // Np * Np - late  # what is measured from here on has not arrived yet
     last = np.where(begin > 0, measured[begin - 1], -1)
-    residual = np.where(last >= 0, (x_meas - x_pb)[last], 0.0)
-    return np.where(active, x_pb + residual, x_pb)
+    return np.where(active & (last >= 0), x_pb + (x_meas - x_pb)[last], x_pb)
 
 
 def batch_rms(error: Array, Np: int) -> Array:

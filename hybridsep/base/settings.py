@@ -190,8 +190,7 @@ class PredictorSettings(Settings):
     @property
     def warm_up(self) -> float:
         """Warm-up, s: ``t_init``, or where that is automatic none with averaging and 0.3 s without."""
-        automatic = 0.0 if self.averaging else 0.3
-        return automatic if self.t_init < 0.0 else self.t_init
+        return self.t_init if self.t_init >= 0.0 else 0.0 if self.averaging else 0.3
 
     @property
     def n_late(self) -> int:

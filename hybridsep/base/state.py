@@ -141,6 +141,4 @@ def _rebuilt(like: Any, values: Iterator[Array]) -> Any:
     found = next(values)
     if isinstance(like, np.ndarray):
         return found > 0.0 if like.dtype == np.bool_ else np.array(found, order="F" if like.flags.fnc else "C")
-    if like is None:
-        return None if np.isnan(found) else float(found)
-    return type(like)(found)
+    return type(like)(found) if like is not None else None if np.isnan(found) else float(found)

@@ -132,5 +132,4 @@ class DriveBounds:
         if order == 0:
             return np.zeros(len(x_d))
         own = np.diff(np.concatenate((before, x_d)), order)[3 - order :] / bound
-        width = 2 * self._near + 1
-        return np.where(maximum_filter1d(np.abs(own), width, mode="constant") > _EXCEEDED, own, 0.0)
+        return np.where(maximum_filter1d(np.abs(own), 2 * self._near + 1, mode="constant") > _EXCEEDED, own, 0.0)

@@ -53,8 +53,7 @@ class FirInverse:
     def _features(self, x: Array) -> Array:
         """Return the regressors of a motion, ``(n, m + s + 1)``; it rests before and after."""
         near = [np.clip(np.arange(len(x))[:, None] + ahead, 0, len(x) - 1) for ahead in (self.taps, self.signs)]
-        signs = np.tanh(np.gradient(x) / self.slow)[near[1]]
-        return np.column_stack((np.diff(x[near[0]]), signs, np.ones(len(x))))
+        return np.column_stack((np.diff(x[near[0]]), np.tanh(np.gradient(x) / self.slow)[near[1]], np.ones(len(x))))
 
 
 class PlayedCommand:

@@ -121,7 +121,7 @@ class Tracking:
         if monitored and self.following_error_max < self.none.largest:
             trips += (
                 " The log's own error is above it, so the compensator may trip at once: take what the zeros are apart "
-                "from the measurement or, where the axis sags, give both limits."
+                "from the measurement or, where the axis sags or such errors are ordinary, give both limits."
             )
         how = (
             "An estimate: the compensator plans in closed loop on the identified model, to which the residual of the "

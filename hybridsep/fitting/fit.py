@@ -24,7 +24,7 @@ from .advice import Judged
 from .compensation import expected_tracking, taught
 from .identified_plant import identified_plant
 from .lags import choose_settings, period_finding, settings_to_try, with_window
-from .limits import drive_limits, estimated_limits
+from .limits import drive_limits, estimated_limits, far_words, largest_motion, usual_error
 from .replay import Recording, beginnings, replay, split_log
 from .result import Fit, Progress
 
@@ -143,13 +143,14 @@ def fit(
     model = found.model
     default = replace(default, input_hold=found.input_hold)
     progress("look for what repeats with the position", 0.38)
-    if period := period_finding(model, recordings, default, shown):
-        found = replace(found, findings=(*found.findings, period))
+    period, usual = period_finding(model, recordings, default, shown), usual_error(recordings, T_s)
+    far = far_words(largest_motion(recordings, T_s)[1], usual, shown)
+    found = replace(found, findings=(*found.findings, *filter(None, (period, far))))
     tried = beginnings(recordings, _TRIED_MAX)
     needed = model.needed_preview(T_s, default.input_hold)
     ahead = needed if ahead is None else ahead
     # A compensator has shorter windows, and what the predictor has learned is to serve it, too
-    limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
+    limits: dict[str, Any] = {**estimated_limits(recordings, T_s, usual), **given_limits}
     if given_limits:
         limits.pop("estimated", None)
     own = Limits(**{one: limits[one] for one in Limits.parameters()}) if limits else None

@@ -164,8 +164,7 @@ def commands_to_try(recordings: Sequence[Recording]) -> Array:
     acceleration = float(np.abs(np.diff(found[::over], 2)).max(initial=0.0)) / over**2
     n = math.ceil(3.0 * abs(first) / max(acceleration, 1e-3 * abs(first)))
     share = np.arange(n, 0, -1) / n  # of the way to the first sample, backwards
-    steps = first * share**2 * (3.0 - 2.0 * share)
-    return np.concatenate((found[0] - np.cumsum(steps)[::-1], found))
+    return np.concatenate((found[0] - np.cumsum(first * share**2 * (3.0 - 2.0 * share))[::-1], found))
 
 
 def _refined(alone: _Disturbed, settings: PredictorSettings, pieces: Sequence[_Piece]) -> list[_Disturbed]:

@@ -45,8 +45,7 @@ def settings_to_try(
     """Return the settings and others with the same window, with lags ``p`` if some are given, else at most ``most``."""
     Np = settings.Np
     lags = dict.fromkeys([settings.p, *(p or (min(max(1, round(share * Np)), most) for share in _SHARES))])
-    found = [replace(settings, p=p) for p in lags]
-    return found + [replace(settings, q=q) for q in _Q if q < Np and q != settings.q]
+    return [replace(settings, p=p) for p in lags] + [replace(settings, q=q) for q in _Q if q < Np and q != settings.q]
 
 
 def choose_settings(

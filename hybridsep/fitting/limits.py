@@ -11,6 +11,7 @@ from ..base.metrics import largest
 from ..base.settings import DRIVE_LIMIT_ENTRIES, Limits
 from ..base.signals import Array
 from ..logs.checks import resolution
+from ..logs.units import DisplayUnits
 from .replay import Recording
 
 MARGINS = np.array([1.25, 2.0, 5.0])
@@ -23,6 +24,9 @@ _HELD, STEPS = 0.1, 100  # quantile of the intervals between changes for which a
 _ZERO, _VARIES = 10.0, 0.999
 """Offset of command and measurement, relative to what the error varies by in this share of the samples, from which on
 limits do not count it."""
+
+_PIECES, _SHORTEST, _FEW, _USUAL = 40, 100, 10, 0.75  # of a log; samples; those in motion that tell; share that does
+_FAR = 3.0  # largest error that counts, relative to the usual one: good logs have 2.6 at most
 
 FOLLOWING_ERROR = 1.3
 """``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
@@ -75,28 +79,55 @@ def _motion(x_d: Array, T_s: float) -> list[float]:
     return found
 
 
-def _largest_error(error: Array) -> float:
-    """Return the largest servo error of a log, ``(n,)``, m: about its median where that is an offset."""
+def _sizes(error: Array) -> Array:
+    """Return the sizes of a log's servo errors, ``(n,)``, m: about their median where that is an offset."""
     median = float(np.nanmedian(error))
     varies = np.abs(error - median)
     is_offset = 0.0 < _ZERO * float(np.nanquantile(varies, _VARIES)) < abs(median)
-    return float(np.nanmax(varies if is_offset else np.abs(error)))
+    return np.asarray(varies if is_offset else np.abs(error))
 
 
 def largest_motion(recordings: Sequence[Recording], T_s: float) -> tuple[Array, float]:
     """Return the largest velocity, acceleration and jerk of the commands, ``(3,)``, and the largest servo error, m."""
     peaks = np.array([_motion(one.x_d, T_s) for one in recordings]).reshape(-1, 3).max(axis=0, initial=0.0)
     measured = [error for error in (one.x_d - one.x for one in recordings) if np.isfinite(error).any()]
-    return peaks, max(map(_largest_error, measured), default=0.0)
+    return peaks, max((float(np.nanmax(_sizes(error))) for error in measured), default=0.0)
 
 
-def estimated_limits(recordings: Sequence[Recording], T_s: float) -> dict[str, Any]:
+def usual_error(recordings: Sequence[Recording], T_s: float) -> float:
+    """Return the servo error that most of a log lets expect of its fastest motion, m; infinite where little moves."""
+    n = max(_SHORTEST, sum(len(one.x) for one in recordings) // _PIECES)
+    known = [(one.x_d, _sizes(one.x_d - one.x)) for one in recordings if np.isfinite(one.x).any()]
+    pieces = [(x_d[k : k + n], sizes[k : k + n]) for x_d, sizes in known for k in range(0, len(x_d) - n + 1, n)]
+    found = [[*_motion(x_d, T_s)[:2], np.nanmax(one)] for x_d, one in pieces if np.isfinite(one).any()]
+    motion, (errors,) = np.split(np.reshape(found, (-1, 3)).T, [2])
+    fastest = np.maximum(motion.max(axis=1, initial=0.0, keepdims=True), np.finfo(float).tiny)
+    demand = (motion / fastest).max(axis=0)
+    moving = demand > 0.0
+    usual = float(np.quantile(errors[moving] / demand[moving], _USUAL)) if moving.sum() >= _FEW else 0.0
+    return usual or math.inf
+
+
+def far_words(error: float, usual: float, shown: DisplayUnits) -> str:
+    """Return in words that a log's largest servo error, m, is far above the usual; empty where it is not."""
+    if error <= _FAR * usual:
+        return ""
+    found, counted = shown.words(error, ".4g"), shown.words(_FAR * usual, ".4g")
+    return (
+        f"the largest servo error, {found}, is {error / usual:.3g} times what most of the motion lets expect: limits "
+        f"that follow from the log take it for {counted}; look at it in the report"
+    )
+
+
+def estimated_limits(recordings: Sequence[Recording], T_s: float, usual: float = math.inf) -> dict[str, Any]:
     """Return entries of ``[drive_limits]`` from the motion of the commands, marked as estimates; empty without motion.
 
     They are :data:`MARGINS` times the largest velocity, acceleration and jerk; the command may change by twice the
-    largest servo error, and the compensator trips above :data:`FOLLOWING_ERROR` times it.
+    largest servo error, and the compensator trips above :data:`FOLLOWING_ERROR` times it. An error far above the
+    ``usual`` one, m, as of a drive that ran away, counts as :data:`_FAR` times that.
     """
     peaks, error = largest_motion(recordings, T_s)
+    error = min(error, _FAR * usual)
     bounds = (*(MARGINS * peaks).tolist(), 2.0 * error, FOLLOWING_ERROR * error)
     values = list(zip(DRIVE_LIMIT_ENTRIES.items(), bounds, strict=True))
     if not all(value >= (one.minimum or one.nonzero) for (_, one), value in values):

@@ -177,8 +177,7 @@ class Replay:
 
     def rms_within(self, n: int) -> list[float]:
         """Return the RMS of each of :meth:`scored` over the first n samples of every window, m; NaN without any."""
-        place = self._place[self._judged]
-        return [known_rms(one.errors[place < n]) for one in self.scored()]
+        return [known_rms(one.errors[self._place[self._judged] < n]) for one in self.scored()]
 
     def modelled(self, *, tested: bool = False) -> list[tuple[Array, Array, Array]]:
         """Return commands, positions and the physics model's errors of the same instants, (n,) each, m.

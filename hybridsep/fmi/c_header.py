@@ -23,8 +23,7 @@ from pathlib import Path
 
 from ..base.files import data_folder
 from ..base.parameters import angular_unit
-from .description import filled
-from .flavours import FMI_VERSIONS
+from .flavours import FMI_VERSIONS, filled
 from .variables import INTERPOLATED, FmuTable, Value, Variable, layout_of
 
 _MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}

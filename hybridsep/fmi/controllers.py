@@ -19,7 +19,7 @@ from ..base.files import data_folder, write_whole
 from ..base.version import __version__
 from ..machines.machine import Machine
 from .c_header import TABLE_FILE, c_bytes, c_sources, kind_header, table_file
-from .description import filled
+from .flavours import filled
 from .spec import content_guid, table_of
 from .variables import AVERAGING_SETTINGS, COMPENSATOR_SETTINGS, PREDICTOR_SETTINGS
 from .weights import WEIGHTS_FILE

@@ -10,16 +10,13 @@ import html
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
-from string import Template
 from xml.etree import ElementTree as ET
 
 from ..base.version import VERSION_DATE, __version__
+from .flavours import TEMPLATES, filled
 from .reference import AGREEMENT
 from .spec import AUTHOR, COPYRIGHT, FmuSpec
 from .variables import INTERPOLATED, FmuTable, Variable, layout_of
-
-_TEMPLATES = Path(__file__).parent / "templates"
 
 _FMI3_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 _WHOLE = ("Integer", "Int32", "UInt64", "Enumeration")  # kinds whose numbers are whole
@@ -132,7 +129,7 @@ def unit_elements() -> list[ET.Element]:
 
 
 def _template(name: str) -> ET.Element:
-    return ET.fromstring((_TEMPLATES / name).read_bytes())
+    return ET.fromstring((TEMPLATES / name).read_bytes())
 
 
 def document(root: ET.Element) -> bytes:
@@ -221,12 +218,7 @@ _SOURCES = {
 
 def icon(model: str) -> bytes:
     """Return the PNG of a model's icon."""
-    return (_TEMPLATES.with_name("icons") / f"{model}.png").read_bytes()
-
-
-def filled(template: str, **values: object) -> str:
-    """Return a file of ``fmi/templates`` with ``$name`` replaced by values, which are HTML in HTML."""
-    return Template((_TEMPLATES / template).read_text(encoding="utf-8")).substitute(values)
+    return (TEMPLATES.with_name("icons") / f"{model}.png").read_bytes()
 
 
 def documentation(

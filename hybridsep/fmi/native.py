@@ -19,7 +19,7 @@ from ..plants.trajectory import spiral, staircase
 from . import description
 from .c_header import FMI_HEADERS, TABLE_FILE, c_header, c_sources, fmi_headers, table_file
 from .compile import default_targets, libraries, placed
-from .flavours import FMI_VERSIONS
+from .flavours import FMI_VERSIONS, filled
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
 from .weights import WEIGHTS_FILE
@@ -50,7 +50,7 @@ def files(
     if spec.weights is not None:
         content[f"resources/{WEIGHTS_FILE}"] = spec.weights
     run = reference_run(spec) if reference else {}
-    dependencies, sources = description.filled("native_dependencies.txt"), description.compile_note(name, fmi)
+    dependencies, sources = filled("native_dependencies.txt"), description.compile_note(name, fmi)
     content |= description.documentation(spec, needs, dependencies, run, sources=sources)
     guid = content_guid(content, table)
     content[f"resources/{TABLE_FILE}"] = table_file(table, guid)
@@ -77,5 +77,5 @@ def _licenses() -> dict[str, bytes]:
     return {
         "license.txt": (folder.parent / "LICENSE").read_bytes(),
         "fmi-headers.txt": ("\n".join(lines).rstrip("\n") + "\n").encode(),
-        "compiler-runtime.txt": description.filled("compiler_runtime.txt", zig=zig, mingw=mingw).encode(),
+        "compiler-runtime.txt": filled("compiler_runtime.txt", zig=zig, mingw=mingw).encode(),
     }

@@ -15,7 +15,8 @@ import pythonfmu
 
 from ..base.files import data_folder
 from ..base.version import __version__
-from .description import documentation, filled, icon, model_description
+from .description import documentation, icon, model_description
+from .flavours import filled
 from .reference import reference_run
 from .spec import FmuSpec, content_guid
 from .weights import WEIGHTS_FILE

@@ -311,8 +311,7 @@ def starts_in_motion(x_d: Array) -> bool:
 
 def noise_std(x: Array) -> float:
     """Return the standard deviation of white noise on a smooth signal, from the median of its fifth differences."""
-    rough = np.abs(np.diff(x, 5)) if len(x) >= 12 else np.zeros(1)
-    return float(np.median(rough)) / (0.6745 * math.sqrt(252.0))
+    return float(np.median(np.abs(np.diff(x, 5)))) / (0.6745 * math.sqrt(252.0)) if len(x) >= 12 else 0.0
 
 
 def resolution(x: Array) -> float:

@@ -301,8 +301,7 @@ def is_number(text: str) -> bool:
 
 def stamp_kind(text: str) -> str:
     """Return whether a text is a ``"date"``, a ``"time"`` of day or a ``"date and time"``; empty if it is neither."""
-    match = _STAMP.fullmatch(text)
-    if match:
+    if match := _STAMP.fullmatch(text):
         return "date and time" if match["date"] else "time"
     return "date" if _DATE.fullmatch(text) else ""
 

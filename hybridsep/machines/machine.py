@@ -344,8 +344,7 @@ def machine_text(machine: Machine, comments: Iterable[str] = (), *, annotated: b
     head = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
     declared = {**PARAMETERS, **Limits.parameters()}
     words = {name: _words(one, machine.unit == "rad", annotated) for name, one in declared.items()}
-    lines = _lines("", {**machine.table, "T_s": machine.T_s}, words, "")
-    return "\n".join([*head, *lines]).strip("\n") + "\n"
+    return "\n".join([*head, *_lines("", {**machine.table, "T_s": machine.T_s}, words, "")]).strip("\n") + "\n"
 
 
 def _lines(place: str, table: Mapping[str, Any], words: Mapping[str, str], heading: str) -> list[str]:

@@ -108,8 +108,7 @@ class DiscreteModel:
 
     def _block_response(self, s: Array, u: Array) -> tuple[Array, Array]:
         n = len(u)
-        x_pb = self._O[:n] @ s + self._T[:n, :n] @ u
-        return x_pb, self._powers[n] @ s + self._K[:, self._block - n :] @ u
+        return self._O[:n] @ s + self._T[:n, :n] @ u, self._powers[n] @ s + self._K[:, self._block - n :] @ u
 
 
 def discretised_block(A: Array, b: Array, T_s: float, input_hold: str) -> tuple[Array, Array, Array]:

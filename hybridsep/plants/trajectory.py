@@ -102,8 +102,7 @@ def staircase(T_s: float = 1e-3, *, limits: Limits = PAPER_LIMITS) -> Array:
     It has 6001 samples at 1 ms; each move takes 0.143 s under eq. (14), and ParameterError is raised if one would take
     more than a second.
     """
-    steps = np.array([0.0, 1, 2, 3, 2, 1, 0]) * 0.010
-    return rest_to_rest(steps, limits, T_s, start_times=range(6), duration=6.0)
+    return rest_to_rest(np.array([0.0, 1, 2, 3, 2, 1, 0]) * 0.010, limits, T_s, start_times=range(6), duration=6.0)
 
 
 def spiral(

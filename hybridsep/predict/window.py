@@ -93,5 +93,4 @@ class WindowOperator:
 
     def __call__(self, x_d: ArrayLike) -> Array:
         """Return ``G_h x_d + free`` for commands ``x_d``, ``(n,)``, m."""
-        command = as_samples(x_d, "x_d", len(self.g_h))
-        return np.asarray(lfilter(self.g_h, [1.0], command)) + self.free
+        return np.asarray(lfilter(self.g_h, [1.0], as_samples(x_d, "x_d", len(self.g_h)))) + self.free

@@ -56,8 +56,7 @@ def axis(drive_limits: dict[str, float]) -> Machine:
 
 def command() -> Array:
     targets = np.concatenate(([0.0], np.random.default_rng(0).uniform(-0.01, 0.01, 8)))
-    starts = [0.05 + 0.4 * i for i in range(8)]
-    return rest_to_rest(targets, PAPER_LIMITS, T_S, start_times=starts, duration=3.3)
+    return rest_to_rest(targets, PAPER_LIMITS, T_S, start_times=[0.05 + 0.4 * i for i in range(8)], duration=3.3)
 
 
 @pytest.mark.slow

@@ -43,8 +43,7 @@ def exact_matrices(f_n: float, zeta: float, alpha: float, beta: float, hold: str
         A, g1, g2 = exponential[:2, :2], exponential[:2, 2], exponential[:2, 3]
         c = mpmath.matrix([[mpmath.mpf(alpha) / w**2, mpmath.mpf(beta) / w]])
         b, d = (g1, mpmath.zeros(1)) if hold == "zoh" else (A * g2 + g1 - g2, c * g2)
-        parts = {"A": A, "b": b, "c": c, "d": d}
-        return {name: np.array([float(x) for x in part]) for name, part in parts.items()}
+        return {name: np.array(list(map(float, part))) for name, part in (("A", A), ("b", b), ("c", c), ("d", d))}
 
 
 @pytest.mark.parametrize("hold", ["zoh", "foh"])

@@ -38,8 +38,7 @@ def written(folder: Path, system: str, place: str = "") -> Path:
     """Write a system as one file."""
     folder.mkdir()
     compensate, machine = "hybrid" if system == "compensator" else None, load_machine("spring_mass_damper")
-    path = folder / "staircase.ssp"
-    return build_system(machine, path, COMMANDS[place], compensate=compensate, targets=("host",))
+    return build_system(machine, folder / "staircase.ssp", COMMANDS[place], compensate=compensate, targets=("host",))
 
 
 def python(folder: Path, *arguments: object) -> str:

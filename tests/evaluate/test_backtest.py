@@ -31,8 +31,7 @@ def log(n: int = 1010) -> tuple[Array, Array]:
     """Return a command and a position that lags behind it, offset and curved as no linear model has it."""
     t = np.arange(n) * 1e-3
     x_d = 0.1 + 0.01 * np.sin(9 * t) ** 3
-    x = 0.1 + 0.0098 * np.sin(9 * (t - 0.004)) ** 3 + 1e-5 * np.tanh(50 * np.cos(9 * t))
-    return x_d, x
+    return x_d, 0.1 + 0.0098 * np.sin(9 * (t - 0.004)) ** 3 + 1e-5 * np.tanh(50 * np.cos(9 * t))
 
 
 @pytest.mark.skipif(not EMPS.is_file(), reason="needs ../shared/data/emps beside the repository")

@@ -26,8 +26,7 @@ def axis(n: int = 600, seed: int = 0) -> tuple[Array, Array]:
     """Command and measurement of an axis of second order under a random, smooth command."""
     rng = np.random.default_rng(seed)
     x_d = np.cumsum(lfilter([0.02], [1.0, -0.98], rng.normal(0.0, 1e-3, n))) + 0.1
-    x = x_d[0] + lfilter([0.05, 0.02], [1.0, -1.6, 0.67], x_d - x_d[0]) + rng.normal(0.0, 1e-6, n)
-    return x_d, np.asarray(x)
+    return x_d, x_d[0] + lfilter([0.05, 0.02], [1.0, -1.6, 0.67], x_d - x_d[0]) + rng.normal(0.0, 1e-6, n)
 
 
 def peer(found: tuple[Peer, ...], name: str, way: str) -> Peer:

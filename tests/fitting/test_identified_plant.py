@@ -10,7 +10,7 @@ from hybridsep.base.metrics import peak_derivatives
 from hybridsep.base.settings import PredictorSettings
 from hybridsep.base.signals import Array
 from hybridsep.fitting.identified_plant import commands_to_try, identified_plant
-from hybridsep.fitting.limits import estimated_limits, held_for, largest_motion, rounding_of
+from hybridsep.fitting.limits import estimated_limits, far_words, held_for, largest_motion, rounding_of, usual_error
 from hybridsep.fitting.replay import Recording
 from hybridsep.logs.units import shown_in
 from hybridsep.plants.stage_drive import StageDrive
@@ -132,6 +132,26 @@ def test_limits_are_estimated_from_the_motion() -> None:
     assert found["change_max"] == pytest.approx(2 * np.abs(recording.x_d - recording.x).max(), rel=1e-3)
     assert found["estimated"] is True
     assert estimated_limits([replace(recording, x_d=np.zeros(9), x=np.zeros(9))], T_S) == {}
+
+
+@pytest.mark.parametrize(("runaway", "told"), [(0.0, ""), (0.08, "80.48 mm, is 167 times")])
+def test_limits_leave_out_errors_far_above_the_usual(runaway: float, told: str) -> None:
+    """A drive with a limiter of its own ran away in a log, and then in the loop: it was allowed 81 mm."""
+    one = recorded(StageDrive(ModalModel([MODE])))
+    largest, x = np.abs(one.x_d - one.x).max(), one.x + runaway * (np.arange(len(one.x)) // 100 == 9)
+    usual = usual_error([log := replace(one, x=x), replace(one, x=np.full(len(x), np.nan))], T_S)
+    assert usual == pytest.approx(largest, rel=0.2)
+    found = estimated_limits([log], T_S, usual)["following_error_max"]
+    assert found == pytest.approx(1.3 * min(largest + runaway, 3.0 * usual), rel=1e-3)
+    assert told in far_words(largest + runaway, usual, shown_in("mm"))
+
+
+def test_the_error_of_the_only_fast_move_is_usual() -> None:
+    slow = rest_to_rest([0.0, 0.01] * 15, Limits(0.02, 1.0, 100.0), T_S)
+    x_d = np.concatenate((slow, rest_to_rest([slow[-1], 0.06, 0.0], Limits(0.2, 10.0, 1000.0), T_S), slow))
+    error = 0.02 * np.gradient(x_d, T_S)
+    assert usual_error([Recording(x_d, x_d - error, 9)], T_S) > 0.9 * np.abs(error).max()
+    assert usual_error([Recording(x_d[-99:], x_d[-99:], 9)] * 2, T_S) == np.inf  # too few pieces move
 
 
 @pytest.mark.parametrize("rounding", [0.0, 1e-7])

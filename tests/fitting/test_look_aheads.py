@@ -45,8 +45,7 @@ def looked(machine: Machine, recording: Recording) -> LookAheads:
 @pytest.fixture(scope="module")
 def found() -> LookAheads:
     discrete = SERVO.discretise(T_S)
-    recording = Recording(MOVES, discrete.forced_response(discrete.rest(), MOVES)[0], 500)
-    return looked(axis(SERVO, 50), recording)
+    return looked(axis(SERVO, 50), Recording(MOVES, discrete.forced_response(discrete.rest(), MOVES)[0], 500))
 
 
 def test_a_look_ahead_leaves_what_a_loop_on_the_model_does(found: LookAheads) -> None:

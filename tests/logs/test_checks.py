@@ -106,8 +106,7 @@ def _resting_axis() -> Log:
         return np.asarray(0.05 * np.exp(-t) * np.sin(2 * np.pi * 3.0 * t) ** 2)
 
     t = np.asarray(1e-2 * np.arange(2000), dtype=np.float64)
-    x = np.asarray(1e-5 * np.round(command(t - 1.004) / 1e-5), dtype=np.float64)
-    return log_of(command(t - 1.0), x, 1e-2)
+    return log_of(command(t - 1.0), 1e-5 * np.round(command(t - 1.004) / 1e-5), 1e-2)
 
 
 def _reaches_a_share(share: float) -> Log:

@@ -29,8 +29,7 @@ def solved(
     first: float = 1.0,
     least: float = 1e-9,
 ) -> SolvedExpert:
-    variance = ExpertErrors(noise, correlation).variance(evidence.target_square, first, least)
-    return solve(evidence, variance, SHARES, p)
+    return solve(evidence, ExpertErrors(noise, correlation).variance(evidence.target_square, first, least), SHARES, p)
 
 
 def written_out(

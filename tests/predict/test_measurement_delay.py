@@ -20,8 +20,7 @@ SETTINGS: list[dict[str, Any]] = [{"averaging": True}, *({"averaging": False, "t
 def drive() -> tuple[Array, Array]:
     """Return commands and positions with a residual that a prediction can follow, (N,), m."""
     x_d = 0.3 + cycles(N) ** 2 / 5e-3
-    rng = np.random.default_rng(4)
-    return x_d, physics(x_d) + 1e-5 * np.sin(np.arange(N) / 17) + rng.normal(0.0, 1e-7, N)
+    return x_d, physics(x_d) + 1e-5 * np.sin(np.arange(N) / 17) + np.random.default_rng(4).normal(0.0, 1e-7, N)
 
 
 def late(delay: int) -> Array:

@@ -21,14 +21,12 @@ ALL = np.ones(N, dtype=np.bool_)
 
 def window(uncertainty: Uncertainty, variance: Array | float = 0.0, e_h: Array | float = 0.0) -> PredictedError:
     """Return the predicted error of a window at rest, with the ``variance`` of the model and a residual ``e_h``."""
-    x_pb = np.zeros(N)
-    return uncertainty.predict(x_pb, x_pb + e_h, variance, N)
+    return uncertainty.predict(np.zeros(N), np.zeros(N) + e_h, variance, N)
 
 
 def moving(uncertainty: Uncertainty, speed: Array | float) -> PredictedError:
     """Return the predicted error of a window of a ``speed``, m per sample."""
-    x_pb = np.cumsum(np.zeros(N) + speed)
-    return uncertainty.predict(x_pb, np.zeros(N), 0.0, N)
+    return uncertainty.predict(np.cumsum(np.zeros(N) + speed), np.zeros(N), 0.0, N)
 
 
 def after_noise(std: float, n: int = 60, seed: int = 0, uncertainty: Uncertainty | None = None) -> Uncertainty:

@@ -42,8 +42,7 @@ def moved(model: str, n: int = 3300, noise_std: float | None = None, seed: int =
 def late(model: str, Np: int, delay: int, n: int = 1200) -> tuple[Array, Array]:
     """Return the inputs of a look-ahead whose sensor is late, from rest, (n,), m."""
     x_d, x = moved(model)
-    at_rest = np.full(Np + delay, x_d[0])
-    return x_d[:n], np.concatenate((at_rest, x))[:n]
+    return x_d[:n], np.concatenate((np.full(Np + delay, x_d[0]), x))[:n]
 
 
 def cut(model: str, Np: int, delay: int, n: int = 1000) -> tuple[Array, Array]:

@@ -32,8 +32,7 @@ def steps_of(pattern: str) -> list[Fraction]:
         sizes = [Fraction(int(rng.integers(1500, 50_000)), 9973) for _ in range(4 * N_SAMPLES)]
     else:
         sizes = [Fraction(pattern)] * math.ceil(N_SAMPLES / Fraction(pattern))
-    ends = list(accumulate(sizes))
-    return sizes[: next(i for i, end in enumerate(ends, start=1) if end >= N_SAMPLES)]
+    return sizes[: next(i for i, end in enumerate(accumulate(sizes), start=1) if end >= N_SAMPLES)]
 
 
 def in_steps(new_stream: StreamMaker, sizes: list[Fraction], start: float) -> tuple[Clock, list[list[float]]]:

@@ -49,8 +49,7 @@ def beyond(x_dm: Array, limits: Limits) -> float:
 
 def turned(x_dm: Array, x_d: Array) -> int:
     """Return in how many samples a command runs against one that moves; m."""
-    against = np.diff(x_dm) * np.sign(np.diff(x_d))
-    return int(np.sum(against[np.abs(np.diff(x_d)) > 1e-12] < -1e-12))
+    return int(np.sum((np.diff(x_dm) * np.sign(np.diff(x_d)))[np.abs(np.diff(x_d)) > 1e-12] < -1e-12))
 
 
 def closed(sep: SepCompensator, seed: int = 0, **more: Any) -> Run:

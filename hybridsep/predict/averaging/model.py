@@ -163,8 +163,7 @@ class AveragedModel:
             square = learned.scales[kind].largest_square
             first = settings.noise_std**2 or CONSTANTS.first_noise * square
             least = min(settings.lam, CONSTANTS.least_noise * square)
-            targets = self.evidence[kind].target_square(expert.weight)
-            return learned.errors_of(expert).variance(targets, first, least)
+            return learned.errors_of(expert).variance(self.evidence[kind].target_square(expert.weight), first, least)
 
         return replace(self, noise=tuple(noise(one) for one in REGRESSIONS))
 
@@ -208,8 +207,7 @@ class AveragedModel:
             stacks, errors = [one.copy(leading, FRESH_START) for one in stacks], learned.errors_of(leading)
         learned = replace(learned.with_errors({FRESH_START: errors}), stacks=tuple(stacks))
         run = RunState.init(self.settings.p, self.static, self.run.memory.restart())
-        state = replace(self, learned=learned, evidence=evidence, leader=leading.place, run=run)
-        return state.with_noise(learned)
+        return replace(self, learned=learned, evidence=evidence, leader=leading.place, run=run).with_noise(learned)
 
     def plan_ahead(self, preview: int) -> AveragedModel:
         """Return the model where a compensator decides the commands, and knows ``preview`` samples ahead."""

@@ -58,8 +58,7 @@ class Memory:
         commands = np.concatenate((unknown, self.commands[:n_measured]))
         end = np.array([[0.0], [commands[-1]], [0.0]])
         measured, repeats = np.hstack((self.measured, end))[:, 1:] - end, np.append(self.repeats, 0.0)[1:]
-        commands = np.append(commands[1:], commands[-1]) - commands[-1]
-        return Memory(commands, measured, repeats, np.zeros(size), 0.0, 0)
+        return Memory(np.append(commands[1:], commands[-1]) - commands[-1], measured, repeats, np.zeros(size), 0.0, 0)
 
     def append_commands(self, path: Array, n_known: int | None, Np: int) -> "Memory":
         """Return the memory that knows the first ``n_known`` commands of those to predict, ``(m,)``, m."""

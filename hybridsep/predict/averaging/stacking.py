@@ -53,8 +53,7 @@ class Stack:
         least_sum = float(np.min(total - 2.0 * cross + gram.diagonal(), initial=total))
         ridge = kappa * max(least_sum / rows, least, _LEAST_SQUARE) * n
         hessian, linear = gram + ridge * np.eye(len(EXPERTS)), cross + ridge * prior
-        weights = simplex_minimum(hessian, linear, self.weights > 0.0)
-        return Stack(weights, gram, cross, evidence)
+        return Stack(simplex_minimum(hessian, linear, self.weights > 0.0), gram, cross, evidence)
 
     def others(self) -> Array:
         """Return the weights of all experts but RECALL, with its weight shared among them and physics."""

@@ -62,6 +62,4 @@ class WarmStartRows:
 
     def learn(self, rows: Array, lagged: Array, target: Array) -> WarmStartRows:
         """Learn rows of features ``(m, n_static)``, lags ``(m, p)`` and targets ``(m,)``."""
-        if not len(target):
-            return self
-        return replace(self, this=self.this.update(rows, lagged, target))
+        return replace(self, this=self.this.update(rows, lagged, target)) if len(target) else self

@@ -57,9 +57,8 @@ def _staircase(draws: Draws, n: int) -> Array:
     stroke, steps = _stroke(draws, 0.03), draws.whole(1, 6)
     rest = draws.uniform(0.05, 1.0)
     sign = draws.sign()
-    up = [(sign * stroke, rest)] * steps
-    down = [(-sign * stroke, rest)] * steps
-    return _moves(cycle(up + down), _limits(draws, stroke), n)
+    moves = [(one * sign * stroke, rest) for one in (1, -1) for _ in range(steps)]
+    return _moves(cycle(moves), _limits(draws, stroke), n)
 
 
 def _cycles(draws: Draws, n: int) -> Array:

@@ -55,8 +55,7 @@ class ModalDrive:
 
     def with_gain(self, gain: float) -> "ModalDrive":
         """Return the same drive with another static gain, all modes scaled alike."""
-        scale = gain / self.gain
-        return replace(self, modes=tuple(replace(mode, g=mode.g * scale) for mode in self.modes))
+        return replace(self, modes=tuple(replace(mode, g=mode.g * (gain / self.gain)) for mode in self.modes))
 
 
 def random_modes(draws: Draws) -> ModalDrive:

@@ -41,8 +41,7 @@ def physics_alone(drive: Drive) -> Array:
 
 def core_replay(predictor: str, model: ModalModel, settings: PredictorSettings, x_d: Array, x_meas: Array) -> Array:
     """Return ``x_h`` of the C core's predictor, ``(n,)``, m; with averaging ``x_meas`` is NaN where missing."""
-    outputs = core_outputs(predictor, model, settings, x_d, x_meas, ("x_h",))
-    return np.asarray(outputs[0])
+    return np.asarray(core_outputs(predictor, model, settings, x_d, x_meas, ("x_h",))[0])
 
 
 def core_outputs(

@@ -25,8 +25,7 @@ class Dynamics:
     @classmethod
     def draw(cls, draws: Draws, fastest: float) -> "Dynamics":
         """Return random bounds up to a velocity, m/s."""
-        velocity = fastest * draws.log_uniform(0.1, 1.0)
-        return cls(velocity, draws.log_uniform(0.5, 8.0), draws.log_uniform(0.005, 0.06))
+        return cls(fastest * draws.log_uniform(0.1, 1.0), draws.log_uniform(0.5, 8.0), draws.log_uniform(0.005, 0.06))
 
     def filtered(self, velocity: Array, T_s: float) -> Array:
         """Return a velocity, (n,), m/s, whose changes keep the bounds."""
