@@ -57,7 +57,7 @@ def machine_of_drive(recipe: Recipe) -> Machine:
     velocity, acceleration, jerk = (spare * peak for spare, peak in zip(SPARE, peak_derivatives(x_d, T_s), strict=True))
     limits, change_max = Limits(velocity, acceleration, jerk), 2 * largest(error)
     given = CompensatorSettings(limits=limits, change_max=change_max)
-    window = given.window(recipe.model.look_ahead(T_s, hold), T_s)
+    window = given.window(recipe.model.needed_preview(T_s, hold), T_s)
     return machine_of(
         *(recipe.model, hold, T_s, "two_mass", f"Drive of two masses {recipe.index}"),
         predictor={"Np": Np, "p": min(50, Np, window)},

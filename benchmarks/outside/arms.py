@@ -28,7 +28,8 @@ from benchmarks.outside.controller import Controller
 from hybridsep.base.metrics import ErrorSize
 from hybridsep.base.signals import Array
 from hybridsep.cosim.fir_inverse import FirInverse
-from hybridsep.fitting.fit import Fit, fit
+from hybridsep.fitting.fit import fit
+from hybridsep.fitting.result import Fit
 from hybridsep.machines.machine import Machine
 
 T_S, NP, RESOLUTION = 2e-3, 50, 2 * np.pi / 2**17

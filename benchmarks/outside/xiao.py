@@ -32,9 +32,10 @@ from benchmarks.outside.controller import Controller
 from hybridsep.base.metrics import ErrorSize
 from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fitting.fit import Fit, fit
+from hybridsep.fitting.fit import fit
 from hybridsep.fitting.limits import estimated_limits
 from hybridsep.fitting.replay import Recording
+from hybridsep.fitting.result import Fit
 from hybridsep.identify.model import machine_of
 from hybridsep.machines.machine import Machine
 from hybridsep.model.physics import ModalModel

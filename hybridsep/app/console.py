@@ -261,7 +261,7 @@ def _same_file(one: Path, other: Path) -> bool:
 
 def written_before(results: Path, logs: Sequence[Path]) -> set[Path]:
     """Return the files beside a ``fit.json`` that the fit of the same logs wrote, and that nobody has edited since."""
-    from ..fitting.build import sha256_of
+    from ..base.files import sha256_of
 
     try:
         written = json.loads(results.read_bytes())["written"]

@@ -63,9 +63,9 @@ def cosim(
         _two_axes(axes or [], path, entries or (), unit, out=out, figure=figure, force=force, as_json=as_json)
         return
     from ..cosim.loop import cosimulate
-    from ..fitting.compensation import Stretch
     from ..fitting.expected import Trial, limits_that_bind
     from ..fitting.replay import Recording
+    from ..fitting.stretch import Stretch
     from ..fmi.archive import build_here
     from ..logs.units import shown_of
     from ..machines.machine import load_machine, machine_path

@@ -15,7 +15,7 @@ from ..base.settings import PARAMETERS, Cascade, Limits
 from . import options
 
 if TYPE_CHECKING:
-    from ..fitting.fit import Fit
+    from ..fitting.result import Fit
 
 _Parsed = TypeVar("_Parsed")
 
@@ -87,9 +87,9 @@ def fit(
     gains = _parsed(cascade, _gains, "--cascade must be NAME=VALUE with commas, each a number")
     used = different_logs([read_log(path, **reading.arguments()) for path in logs])
     # What computes takes seconds to import: a log that cannot be read is said before
-    from ..fitting.build import fit_files
     from ..fitting.fit import fit as fit_logs
     from ..fitting.limits import drive_limits
+    from ..fitting.result import fit_files
     from ..logs.checks import findings_table
     from .console import console, print_json, progress_bar
 

@@ -6,6 +6,7 @@ process leaves ``.hybridsep-….tmp`` in the target's folder.
 """
 
 import errno
+import hashlib
 import math
 import os
 import stat
@@ -95,3 +96,8 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def sha256_of(path: Path) -> str:
+    """Return the hash of a file's content, ``"unknown"`` where it is none that can be read again, as a pipe."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else "unknown"

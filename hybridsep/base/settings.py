@@ -264,10 +264,10 @@ class CompensatorSettings(Settings):
     """Parameters of the compensator, besides its predictor's.
 
     What is left out is in the drive's time: ``preview`` is what its model needs to follow
-    (:meth:`~hybridsep.model.physics.ModalModel.look_ahead`), ``spacing`` a hundredth of a plan, or a smaller divisor
-    of ``Np``. The differences of ``x_dm`` keep the drive's ``limits``, if there are any; where those of ``x_d`` do not,
-    by what these take more. ``no_reversal`` has no effect without them; with ``averaging`` it bounds the physics
-    model's plan only in the hybrid's stead. ``change_max``, None for no bound, is about twice the servo error
+    (:meth:`~hybridsep.model.physics.ModalModel.needed_preview`), ``spacing`` a hundredth of a plan, or a smaller
+    divisor of ``Np``. The differences of ``x_dm`` keep the drive's ``limits``, if there are any; where those of ``x_d``
+    do not, by what these take more. ``no_reversal`` has no effect without them; with ``averaging`` it bounds the
+    physics model's plan only in the hybrid's stead. ``change_max``, None for no bound, is about twice the servo error
     without compensation; ``following_error_max`` about 1.3 times the largest one
     (:class:`~hybridsep.online.monitor.Monitor`). With ``averaging`` a hybrid plan of motion more than 1.25 times as
     fast as what was learned changes the command by at most half of ``change_max``, and so does the physics model's,
@@ -320,49 +320,49 @@ class CompensatorSettings(Settings):
         unless_given=None,
     )
 
-    def plan(self, look_ahead: int, T_s: float) -> int:
-        """Return the samples of a plan for a drive that needs ``look_ahead``, of ``T_s``, s.
+    def plan(self, needed: int, T_s: float) -> int:
+        """Return the samples of a plan for a drive that needs ``needed``, of ``T_s``, s.
 
         A plan is back at the command at its end. Where the limits need more than half of it to take back the error of
         an axis that lags, half of ``change_max``, it is longer by what they need, and twice as long at most.
         """
         if self.limits is None or self.change_max is None:
-            return look_ahead
+            return needed
         change, own = 0.5 * self.change_max, self.limits
         fastest = change / own.velocity, 2 * math.sqrt(change / own.acceleration), (32 * change / own.jerk) ** (1 / 3)
-        back = math.ceil(min(max(fastest) / T_s, look_ahead))
-        return min(look_ahead + back, _PLAN_MAX) if 2 * back > look_ahead else look_ahead
+        back = math.ceil(min(max(fastest) / T_s, needed))
+        return min(needed + back, _PLAN_MAX) if 2 * back > needed else needed
 
-    def window(self, look_ahead: int, T_s: float) -> int:
-        """Return the samples of a window: a tenth of the preview, which is ``look_ahead`` samples if left out.
+    def window(self, needed: int, T_s: float) -> int:
+        """Return the samples of a window: a tenth of the preview, which is ``needed`` samples if left out.
 
         It is a multiple of ``spacing``, and at least 20, a tenth of what the drive needs or a third of a short preview,
         whichever is least: a controller plans in half of it, and its lags serve a predictor with longer windows, too.
         """
-        preview, spacing = self.preview or look_ahead, self.spacing or self._spacing(look_ahead, T_s)
+        preview, spacing = self.preview or needed, self.spacing or self._spacing(needed, T_s)
         most = max(1, (preview - 4 * spacing - PLAN_END) // spacing)
-        return spacing * min(most, math.ceil(max(min(20, look_ahead / 10, preview / 3), preview / 10) / spacing))
+        return spacing * min(most, math.ceil(max(min(20, needed / 10, preview / 3), preview / 10) / spacing))
 
-    def _spacing(self, look_ahead: int, T_s: float) -> int:
+    def _spacing(self, needed: int, T_s: float) -> int:
         """Return a hundredth of a plan, or a twentieth of a preview that is much shorter."""
-        preview = self.preview or look_ahead
-        return max(1, min(round(max(preview, self.plan(look_ahead, T_s)) / 100), preview // 20))
+        preview = self.preview or needed
+        return max(1, min(round(max(preview, self.plan(needed, T_s)) / 100), preview // 20))
 
-    def for_window(self, Np: int, look_ahead: int, T_s: float) -> "CompensatorSettings":
+    def for_window(self, Np: int, needed: int, T_s: float) -> "CompensatorSettings":
         """Return these settings for windows of ``Np`` samples, defaults filled in.
 
-        A ``preview`` that is left out follows from ``look_ahead``, the samples that the drive needs.
+        A ``preview`` that is left out follows from ``needed``, the samples that the drive needs.
 
         ParameterError if ``preview`` or ``spacing`` does not fit ``Np``.
         """
         spacing, preview = self.spacing, self.preview
         if spacing is None:
-            most = self._spacing(look_ahead, T_s)
+            most = self._spacing(needed, T_s)
             if preview is not None:
                 most = max(1, min(most, (preview - Np - PLAN_END) // 4))
             spacing = max(one for one in range(1, most + 1) if Np % one == 0)
         if preview is None:  # enough after a window that is longer than a tenth of it, too
-            preview = min(max(look_ahead, Np + look_ahead * 3 // 4, Np + 4 * spacing + PLAN_END), _PLAN_MAX)
+            preview = min(max(needed, Np + needed * 3 // 4, Np + 4 * spacing + PLAN_END), _PLAN_MAX)
         problems = []
         if Np % spacing:
             problems.append(f"spacing must be ≥ 1 and divide Np = {Np}, got {spacing}")
@@ -373,7 +373,7 @@ class CompensatorSettings(Settings):
             raise ParameterError("; ".join(problems))
         # After the window, and what the next one leaves as it is, a stop has to fit into the preview
         fits = preview >= Np + Np // 2 + 5 * spacing + PLAN_END
-        horizon = min(self.plan(look_ahead, T_s), _SPLINES * spacing) if self.horizon is None else self.horizon
+        horizon = min(self.plan(needed, T_s), _SPLINES * spacing) if self.horizon is None else self.horizon
         return replace(self, spacing=spacing, preview=preview, horizon=max(preview, horizon if fits else 0))
 
 

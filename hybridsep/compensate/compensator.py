@@ -30,7 +30,7 @@ from ..online.monitor import Monitor
 from ..predict.averaging.features import Disturbance
 from ..predict.predictor import HybridPredictor
 from .limits import DriveBounds
-from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, Preview
+from .planning import AveragedPlanning, PaperPlanning, PendingPlan, Planning, PlanTask
 from .splines import N_DECIDED, SplineBasis
 from .stop import Stop
 
@@ -70,8 +70,8 @@ class SepCompensator:
         Np = predictor.Np
         predictor.settings.check_planning()
         self.predictor = predictor
-        look_ahead = predictor.model.look_ahead(predictor.T_s, predictor.settings.input_hold)
-        self.settings = settings = (settings or CompensatorSettings()).for_window(Np, look_ahead, predictor.T_s)
+        needed = predictor.model.needed_preview(predictor.T_s, predictor.settings.input_hold)
+        self.settings = settings = (settings or CompensatorSettings()).for_window(Np, needed, predictor.T_s)
         assert settings.preview is not None
         assert settings.spacing is not None
         assert settings.horizon is not None
@@ -175,9 +175,9 @@ class SepCompensator:
         path = np.concatenate((command, command[-1] + (command[-1] - command[-2]) * more))
         loads = np.concatenate((loads, np.full(len(more), loads[-1])))
         x_d_before, delta_before = self._before[:, -3:]
-        preview = Preview(path, loads, x_d_before, delta_before, self._previous_plan, self._state_before)
+        task = PlanTask(path, loads, x_d_before, delta_before, self._previous_plan, self._state_before)
         fades = self.monitor.is_tripped or self.monitor.is_lost
-        chosen = self._planning.choose(predictor, preview, SepState.OFF if fades else self.compensate)
+        chosen = self._planning.choose(predictor, task, SepState.OFF if fades else self.compensate)
         coefficients, stop = chosen.coefficients, self._last_stop
         if self._stop is not None:
             limits = self._planning.bounds.hard(command, x_d_before, delta_before, turns=len(command))

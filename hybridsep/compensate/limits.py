@@ -97,7 +97,7 @@ class DriveBounds:
     ) -> Bounds:
         """Return the bounds on a change of the remainder of the last plan by free coefficients.
 
-        ``x_d``: (preview,), m: commanded positions. Within the length of a spline of where they exceed a limit, it is
+        ``x_d``: (horizon,), m: commanded positions. Within the length of a spline of where they exceed a limit, it is
         widened by what they take of it; ``x_d_before``, ``delta_before``: (3,), m: the last three before them, and of
         their changes; ``previous_plan``: (3 + n_free,), m: coefficients of the last plan's remainder, decided ones
         first; ``turns``: first samples in which it may turn in spite of ``no_reversal``; ``change``: of ``change_max``.

@@ -79,8 +79,8 @@ class PlanModel:
     ``model``: where the measurements end, which is the beginning of the plan unless they are late; ``state``:
     (n_state,): state of ``G_pb`` there; ``late``: (n_late,), m: commands between there and the plan, relative to the
     start; ``start``: m; ``x_d``: (n,), m: commands from which the scales of the features and the variances of
-    predictions follow, of the remainder of the last plan, relative to the start; ``path``: (preview,), m: unmodified
-    commands, likewise; ``load``: (preview,), m: what the drive's load adds to any commands.
+    predictions follow, of the remainder of the last plan, relative to the start; ``path``: (horizon,), m: unmodified
+    commands, likewise; ``load``: (horizon,), m: what the drive's load adds to any commands.
     """
 
     def __init__(
@@ -259,26 +259,26 @@ class PlannedPoint:
 
     coefficients: Array  # (3 + n_free,), m
     prediction: AveragedForecast  # under the plan, of the residual
-    x_h: Array  # (preview,), m, relative to the start
-    third: Array  # (preview,), m, third differences of δ
+    x_h: Array  # (horizon,), m, relative to the start
+    third: Array  # (horizon,), m, third differences of δ
     cost: float  # m²
 
 
 @dataclass(frozen=True)
-class AveragedPlanner:
+class NewtonSearch:
     """Plans of one window on the averaged model."""
 
     basis: SplineBasis
     splines: Array  # (n_free, m): those that are solved for, as sums of the free ones (``splines.solved_splines``)
     jerk_weight: float  # as of :class:`~hybridsep.base.settings.CompensatorSettings`
     model: PlanModel  # of the plan that the window begins
-    x_d: Array  # (preview,), m: commanded positions, relative to the start
+    x_d: Array  # (horizon,), m: commanded positions, relative to the start
     delta_before: Array  # (3,), m: last three values of δ
 
     def point(self, coefficients: Array, prediction: AveragedForecast | None = None) -> PlannedPoint:
         """Return a plan, whose prediction may be known, with its cost, which is not finite if that overflows."""
         at = prediction or self.model.predict(self.x_d + self.basis.values @ coefficients)
-        before = np.diff(np.concatenate((self.delta_before, np.zeros(self.basis.preview))), 3)
+        before = np.diff(np.concatenate((self.delta_before, np.zeros(self.basis.horizon))), 3)
         third = self.basis.third @ coefficients + before
         x_h = self.model.position(at)
         error = self.basis.weight * (self.x_d - x_h)
@@ -288,7 +288,7 @@ class AveragedPlanner:
     def step(self, start: PlannedPoint, bounds: Bounds, passed: Array, reach: float) -> tuple[PlannedPoint, float]:
         """Return the plan after a Newton step, the start itself if none is better, and the reach of the next step.
 
-        ``start``: where the model is linearised; ``bounds``: on coefficients; ``passed``: (preview, n_free): free
+        ``start``: where the model is linearised; ``bounds``: on coefficients; ``passed``: (horizon, n_free): free
         splines filtered by ``G_pb``; ``reach``: of friction's slope, as of :meth:`PlanModel.slope`.
         """
         values, third = (one[:, N_DECIDED:] @ self.splines for one in (self.basis.values, self.basis.third))

@@ -22,7 +22,7 @@ from ..predict.averaging.model import AveragedModel
 from ..predict.predictor import HybridPredictor
 from ..predict.window import FeatureScales, Prediction
 from .limits import Bounds, DriveBounds
-from .newton import FIRST_REACH, PHYSICS_STEPS, THRICE, TOLERANCE, TWICE, AveragedPlanner, PlanModel, is_better
+from .newton import FIRST_REACH, PHYSICS_STEPS, THRICE, TOLERANCE, TWICE, NewtonSearch, PlanModel, is_better
 from .qp import EXACT, Tolerance, solve_change
 from .splines import N_DECIDED, SplineBasis, solved_splines
 
@@ -47,7 +47,7 @@ class PendingPlan:
 
 
 @dataclass(frozen=True)
-class Preview:
+class PlanTask:
     """Commands to plan, and what the plan goes on from."""
 
     # (horizon,), m: commanded positions, and what the drive's load adds to the command of its model
@@ -92,7 +92,7 @@ class Planning(ABC):
 
     def __init__(self, basis: SplineBasis, bounds: DriveBounds, settings: CompensatorSettings, Np: int) -> None:
         self.basis, self.bounds, self.settings, self.Np = basis, bounds, settings, Np
-        self.horizon, self.spacing = basis.preview, basis.spacing
+        self.horizon, self.spacing = basis.horizon, basis.spacing
         self.n_pinned = min(self.PINNED, Np // 2) // self.spacing
         self.weight: Array | None = None  # (horizon,): of the errors of a plan; without it all count alike
         self.splines = np.eye(basis.n_free)  # (n_free, m): that a plan changes the last one by
@@ -116,7 +116,7 @@ class Planning(ABC):
         return self.ahead[0] if len(self.ahead) else None
 
     @abstractmethod
-    def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
+    def choose(self, predictor: HybridPredictor, task: PlanTask, most: SepState) -> ChosenPlan:
         """Return the best available plan on a model up to ``most``."""
 
     @abstractmethod
@@ -131,46 +131,46 @@ class Planning(ABC):
         g: Array,
         free: Array,
         x_d: Array,
-        preview: Preview,
+        task: PlanTask,
         bounds: Bounds,
         n_pinned: int = 0,
         tolerance: Tolerance = EXACT,
     ) -> Array | None:
         """Return the coefficients of the best plan on a model ``g``, ``free`` of eq. (3); None if there is none.
 
-        ``x_d``, ``(preview,)``, m, counts from where ``free`` does; ``n_pinned``: splines that a bounded plan does not
+        ``x_d``, ``(horizon,)``, m, counts from where ``free`` does; ``n_pinned``: splines that a bounded plan does not
         change.
         """
         if not (np.isfinite(g).all() and np.isfinite(free).all()):
             return None
-        last, before, jerk_weight = preview.previous_plan, preview.delta_before, self.settings.jerk_weight
-        free = free + np.asarray(lfilter(g, [1.0], preview.load))
+        last, before, jerk_weight = task.previous_plan, task.delta_before, self.settings.jerk_weight
+        free = free + np.asarray(lfilter(g, [1.0], task.load))
         cost = self.basis.cost(g, free, x_d, last, before, jerk_weight, self.weight).by(self.splines).regular()
         return solve_change(cost, bounds, last, self.splines, n_pinned, tolerance)
 
-    def ending(self, preview: Preview) -> Array:
+    def ending(self, task: PlanTask) -> Array:
         """Return the coefficients, ``(3 + n_free,)``, m, of a plan that ends compensation, smoothly and soon.
 
         It has the least change of the command that its jerk and the drive's limits allow, and ends where the last plan
         does. Where there is none, or the last plan was one, the remainder of that goes on.
         """
-        if preview.state_before is SepState.OFF:
-            return preview.previous_plan
-        last = preview.previous_plan
+        if task.state_before is SepState.OFF:
+            return task.previous_plan
+        last = task.previous_plan
         at_once, nothing = np.eye(1, self.horizon)[0], np.zeros(self.horizon)
         jerk_weight = (2.0 * math.sin(math.pi * _ENDS / self.horizon)) ** -6.0
         not_pinned = np.eye(self.basis.n_free)[:, self.n_pinned :]
-        cost = self.basis.cost(at_once, nothing, nothing, last, preview.delta_before, jerk_weight)
+        cost = self.basis.cost(at_once, nothing, nothing, last, task.delta_before, jerk_weight)
         cost = cost.by(not_pinned).regular()
         new = np.arange(len(cost.v))[-(self.Np // self.spacing) :]
         cost.P[new, new] *= _NEW
-        found = solve_change(cost, self.limits(preview), last, not_pinned, 0, self.SOLVED)
+        found = solve_change(cost, self.limits(task), last, not_pinned, 0, self.SOLVED)
         return last if found is None else found
 
-    def limits(self, preview: Preview, *, turns: int = 0, change: float = 1.0) -> Bounds:
+    def limits(self, task: PlanTask, *, turns: int = 0, change: float = 1.0) -> Bounds:
         """Return the drive's limits on the coefficients of a plan, and a share of the largest change."""
-        before = preview.x_d_before, preview.delta_before, preview.previous_plan
-        return self.bounds.bounds(preview.command, *before, turns=turns, change=change)
+        before = task.x_d_before, task.delta_before, task.previous_plan
+        return self.bounds.bounds(task.command, *before, turns=turns, change=change)
 
 
 _PINNED_PAPER = 8
@@ -183,21 +183,21 @@ class PaperPlanning(Planning):
     PINNED: ClassVar[int] = _PINNED_PAPER
     SOLVED: ClassVar[Tolerance] = EXACT
 
-    def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
+    def choose(self, predictor: HybridPredictor, task: PlanTask, most: SepState) -> ChosenPlan:
         """Return the plan of the best model that has one, else one without a model."""
         if most is SepState.OFF:
-            return ChosenPlan(SepState.OFF, self.ending(preview), None)
+            return ChosenPlan(SepState.OFF, self.ending(task), None)
         learned = predictor.k >= predictor.n_init and predictor.regression.n_rows > 0
         hybrid = most is SepState.HYBRID and learned and has_stable_poles(predictor.residual.lag_weights)
-        bounds = self.limits(preview)
+        bounds = self.limits(task)
         with np.errstate(all="ignore"):  # a hybrid model that is no candidate may be unstable
             operator = predictor.operator(self.horizon)  # Eq. (3)
         models = [(SepState.HYBRID, operator.g_h, operator.free), (SepState.PHYSICS, operator.g_pb, operator.free_pb)]
         for state, g, free in models if hybrid else models[1:]:
-            found = self.affine_plan(g, free, preview.command, preview, bounds, self.n_pinned)
+            found = self.affine_plan(g, free, task.command, task, bounds, self.n_pinned)
             if found is not None:
                 return ChosenPlan(state, found, None)
-        return ChosenPlan(SepState.OFF, preview.previous_plan, None)
+        return ChosenPlan(SepState.OFF, task.previous_plan, None)
 
     def published(self, prediction: Prediction, state: SepState) -> PublishedPosition:
         """Return the model's position where it planned, else the physics model's."""
@@ -273,19 +273,19 @@ class AveragedPlanning(Planning):
         super().restart()
         self.ahead = np.full((max(1, self.horizon // (2 * self.Np)), len(EXPERTS), self.Np), np.nan)
 
-    def choose(self, predictor: HybridPredictor, preview: Preview, most: SepState) -> ChosenPlan:
+    def choose(self, predictor: HybridPredictor, task: PlanTask, most: SepState) -> ChosenPlan:
         """Return the allowed plan that the averaged model judges best; before it has learned, the physics model's."""
-        averaged, state, previous_plan = predictor.residual, predictor.state, preview.previous_plan
+        averaged, state, previous_plan = predictor.residual, predictor.state, task.previous_plan
         assert isinstance(averaged, AveragedModel)
         assert predictor.start is not None
-        path = preview.command - predictor.start
+        path = task.command - predictor.start
         with np.errstate(all="ignore"):  # a prediction that is no candidate may overflow
             x_d = path + self.basis.values @ previous_plan
-            model = PlanModel(averaged.for_plans(), state.physics, state.late, predictor.start, x_d, path, preview.load)
+            model = PlanModel(averaged.for_plans(), state.physics, state.late, predictor.start, x_d, path, task.load)
         scales = model.scales  # of the remainder of the last plan
         self.ahead[-1] = np.nan
         if most is SepState.OFF:
-            return ChosenPlan(SepState.OFF, self.ending(preview), scales)
+            return ChosenPlan(SepState.OFF, self.ending(task), scales)
         g, free = predictor.physics_operator(self.horizon)
         change = _UNPROVEN if model.outgrows(FASTER) else 1.0
         of_physics_change = 1.0 if averaged.doubts else change
@@ -293,8 +293,8 @@ class AveragedPlanning(Planning):
         follows = has_learned and most is SepState.HYBRID
         tolerance = TOLERANCE._replace(steps=PHYSICS_STEPS) if follows else TOLERANCE
         # relative to the start, as in C: at rest the target is 0, not rounding that a model without a scale would learn
-        bounds = self.limits(preview, turns=self.horizon if most is SepState.PHYSICS else 0, change=of_physics_change)
-        physics = self.affine_plan(g, free, path, preview, bounds, tolerance=tolerance)
+        bounds = self.limits(task, turns=self.horizon if most is SepState.PHYSICS else 0, change=of_physics_change)
+        physics = self.affine_plan(g, free, path, task, bounds, tolerance=tolerance)
         if has_learned:
             end = len(self.ahead) * self.Np
             self.ahead[-1] = model.of_previous_plan.stacked[:, end - self.Np : end]
@@ -304,15 +304,15 @@ class AveragedPlanning(Planning):
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
             jerk_weight = self.settings.jerk_weight
-            planner = AveragedPlanner(self.basis, self.splines, jerk_weight, model, path, preview.delta_before)
-            last = planner.point(previous_plan, prediction=model.of_previous_plan)
-            of_physics, reach = planner.point(physics), None
+            search = NewtonSearch(self.basis, self.splines, jerk_weight, model, path, task.delta_before)
+            last = search.point(previous_plan, prediction=model.of_previous_plan)
+            of_physics, reach = search.point(physics), None
             if follows:
                 hybrid, reach = last, self.reach
                 for _ in range(self.n_steps):
-                    before = replace(preview, previous_plan=hybrid.coefficients)
+                    before = replace(task, previous_plan=hybrid.coefficients)
                     bounds = self.limits(before, turns=self.n_turning, change=change)
-                    hybrid, reach = planner.step(hybrid, bounds, self.basis.filtered(g), reach)
+                    hybrid, reach = search.step(hybrid, bounds, self.basis.filtered(g), reach)
                 if is_better(hybrid.cost, of_physics.cost):
                     step, gain = hybrid.coefficients - previous_plan, last.cost - hybrid.cost
                     share = self._share_of(step)

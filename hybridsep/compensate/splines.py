@@ -70,31 +70,31 @@ class PlanCost:
 class SplineBasis:
     """B-spline basis of one plan.
 
-    ``preview``: samples of the plan; ``spacing``: samples between knots; ``Np``: samples of the window that begins
+    ``horizon``: samples of the plan; ``spacing``: samples between knots; ``Np``: samples of the window that begins
     the plan: all of them count alike.
     """
 
-    def __init__(self, preview: int, spacing: int, Np: int) -> None:
+    def __init__(self, horizon: int, spacing: int, Np: int) -> None:
         width = 4 * spacing
-        self.preview, self.spacing = preview, spacing
-        begin = max(Np, preview // 2)
-        falling = np.arange(preview - begin, 0, -1) / (preview - begin + 1)
+        self.horizon, self.spacing = horizon, spacing
+        begin = max(Np, horizon // 2)
+        falling = np.arange(horizon - begin, 0, -1) / (horizon - begin + 1)
         self.weight: Array = np.concatenate((np.ones(begin), np.maximum(_LEAST, falling)))
-        self.n_free = (preview - width - _END) // spacing + 1
+        self.n_free = (horizon - width - _END) // spacing + 1
         spline = np.asarray(BSpline.basis_element(np.arange(5))(np.arange(width) / spacing))
-        self._spline: Array = np.pad(spline, (0, preview - width))
-        self.values = self.acting(preview, self.n_free)
+        self._spline: Array = np.pad(spline, (0, horizon - width))
+        self.values = self.acting(horizon, self.n_free)
         # Differences over the plan; the three samples before it enter by `before`
         self.third: Array = np.diff(np.pad(self.values, ((3, 0), (0, 0))), 3, axis=0)
 
-    def acting(self, preview: int, n: int) -> Array:
-        """Return the tails of the splines at −3, −2, −1 spacings and ``n`` that begin in it, ``(preview, 3 + n)``."""
-        spacing, spline = self.spacing, np.pad(self._spline[: 4 * self.spacing], (0, preview))
-        tails = [spline[i * spacing : preview + i * spacing] for i in (3, 2, 1)]
-        return np.column_stack((*tails, _shifts(spline[:preview], n, spacing)))
+    def acting(self, samples: int, n: int) -> Array:
+        """Return the tails of the splines at −3, −2, −1 spacings and ``n`` that begin in it, ``(samples, 3 + n)``."""
+        spacing, spline = self.spacing, np.pad(self._spline[: 4 * self.spacing], (0, samples))
+        tails = [spline[i * spacing : samples + i * spacing] for i in (3, 2, 1)]
+        return np.column_stack((*tails, _shifts(spline[:samples], n, spacing)))
 
     def filtered(self, g: Array) -> Array:
-        """Return the free splines filtered by the impulse response ``g``, ``(preview, n_free)``."""
+        """Return the free splines filtered by the impulse response ``g``, ``(horizon, n_free)``."""
         # Time-invariance: one spline is filtered, the others are its shifts
         return _shifts(np.asarray(lfilter(g, [1.0], self._spline)), self.n_free, self.spacing)
 
@@ -110,10 +110,10 @@ class SplineBasis:
     ) -> PlanCost:
         """Return ``‖weight (x_d − G (x_d + δ) − free)‖² + jerk_weight·‖D³ δ‖²`` as a function of a change of a plan.
 
-        ``g``, ``free``: (preview,): first column of ``G``, and the free response, m; eq. (3); ``x_d``: (preview,), m:
+        ``g``, ``free``: (horizon,): first column of ``G``, and the free response, m; eq. (3); ``x_d``: (horizon,), m:
         commanded positions; ``plan``: (3 + n_free,), m: its coefficients, of which the decided ones do not change, as
         the remainder of the last plan has them; ``before``: (3,), m: last three values of δ;
-        ``jerk_weight``: weight of the third differences; ``weight``: (preview,): of the errors; all count alike
+        ``jerk_weight``: weight of the third differences; ``weight``: (horizon,): of the errors; all count alike
         without it.
         """
         delta = self.values @ plan

@@ -1,237 +1,37 @@
-"""From recorded logs to a model that was tested on held-out samples, and to its files: what ``hybridsep fit`` does."""
+"""From recorded logs to a model that was tested on held-out samples: what ``hybridsep fit`` does, in its order."""
 
-import errno
-import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.errors import IdentificationError, ParameterError, SignalError, check_kind, listed
-from ..base.files import as_path, plain, write_whole
-from ..base.metrics import html_table, line_plot
+from ..base.errors import IdentificationError, ParameterError, check_kind, listed
 from ..base.parameters import finite
 from ..base.settings import DRIVE_LIMIT_ENTRIES, PARAMETERS, Cascade, CompensatorSettings, Limits, PredictorSettings
-from ..base.signals import Array, as_samples, check_interval
+from ..base.signals import check_interval
 from ..base.threads import one_blas_thread
-from ..base.version import __version__
-from ..compensate.compensator import SepCompensator
-from ..fmi.archive import build_fmu
 from ..identify.model import IdentifiedModel, machine_of, of_cascade
 from ..identify.operation import TOO_LITTLE, identify_operation, unit_gain_model
 from ..identify.output_error import in_time
-from ..logs.checks import Finding, checked, moved_by_command
+from ..logs.checks import checked, moved_by_command
 from ..logs.controller import controller_of
 from ..logs.log import Log, Table, read_log
-from ..logs.units import si_factor
-from ..machines.machine import Machine, checked_name, machine_text
+from ..machines.machine import Machine, checked_name
 from ..model.physics import ModalModel
 from ..predict.predictor import HybridPredictor
-from ..predict.window import Prediction
-from . import report as sections
-from .advice import Judged, advice_on, settling_words
-from .build import fit_files, sha256_of, write_commands
-from .compensation import Tracking, expected_tracking, taught
-from .identified_plant import IdentifiedPlant, commands_to_try, identified_plant
-from .lags import Tried, choose_settings, period_finding, settings_to_try, with_window
-from .limits import LIMITS_WORDS, drive_limits, estimated_limits
+from .advice import Judged
+from .compensation import expected_tracking, taught
+from .identified_plant import identified_plant
+from .lags import choose_settings, period_finding, settings_to_try, with_window
+from .limits import drive_limits, estimated_limits
 from .replay import Recording, beginnings, replay, split_log
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .result import Fit, Progress
 
 _SHARE = 0.5  # share of each log's samples for training; the rest is held out for the test
 
 _TRIED_MAX = 20_000
 """Leading samples on which settings are tried and a plant is fitted: a minute's log took twice as long without."""
-
-Progress = Callable[[str, float], object]
-
-
-@dataclass(frozen=True, repr=False, eq=False)
-class Fit:
-    """What was found of an axis; it prints as one line, and as a table in a notebook.
-
-    Positions are in m, or rad, but in :meth:`predict`, which takes and gives the unit of the log, :attr:`unit`.
-
-    Attributes
-    ----------
-    logs : tuple of Log
-    findings : mapping
-        Log's name → notes of its checks.
-    machine : Machine
-        Physics model, settings, plant to try with, and limits.
-    identification : IdentifiedModel
-    choice : tuple of Tried
-        Settings that were tried, the default first.
-    judged : Judged
-        Replay of the logs; its test samples are held out from the physics model and from the choice.
-    plant : IdentifiedPlant
-    tracking : Tracking, optional
-        Tracking errors to be expected; None without limits of the drive.
-    trained : bytes
-        The predictor, saved after the logs; with limits of the drive as a compensator begins best.
-    """
-
-    logs: tuple[Log, ...]
-    findings: Mapping[str, Sequence[Finding]]
-    machine: Machine
-    identification: IdentifiedModel
-    choice: tuple[Tried, ...]
-    judged: Judged
-    plant: IdentifiedPlant
-    tracking: Tracking | None
-    trained: bytes
-
-    def __repr__(self) -> str:
-        (scale, unit), best = self.judged.unit, self.judged.replay.best()
-        hybrid = self.judged.replay.scored()[-1]
-        errors = f"hybrid {scale * hybrid.rms:.3g} {unit} RMS, {best.name} {scale * best.rms:.3g} {unit}"
-        notes = dict.fromkeys(one.name for found in self.findings.values() for one in found)
-        said = f"; findings: {', '.join(notes)}" if notes else ""
-        return f"Fit({self.machine.name}: Np = {self.judged.replay.Np}, positions in {self.unit}, {errors}{said})"
-
-    def _repr_html_(self) -> str:
-        scale, unit = self.judged.unit
-        errors = {f"{one.name}, RMS [{unit}]": scale * one.rms for one in self.judged.replay.scored()}
-        return html_table(f"{self.machine.name}, {self.identification.structure}: {self.advice}", errors)
-
-    @property
-    def unit(self) -> str:
-        """Unit of the positions that :meth:`predict` takes and gives, that of the first log, such as ``"mm"``."""
-        return self.logs[0].file_unit or self.machine.unit
-
-    @property
-    def advice(self) -> str:
-        """What to do, in words."""
-        return advice_on(self.judged)
-
-    def predictor(self) -> HybridPredictor:
-        """Return the trained predictor at the beginning of a run."""
-        predictor = HybridPredictor.from_bytes(self.trained)
-        predictor.restart()
-        return predictor
-
-    def compensator(self, compensate: str = "hybrid") -> SepCompensator:
-        """Return a compensator that begins with what was learned, within the machine's limits of the drive.
-
-        ``compensate`` is the best model allowed: ``"off"``, ``"physics"`` or ``"hybrid"``.
-        """
-        settings = replace(self.machine.compensator_settings, compensate=compensate)
-        return self.machine.new_compensator(settings, trained=self.predictor())
-
-    def predict(self, x_d: ArrayLike) -> Prediction:
-        """Return what is predicted, with what was learned, of a window ``(n,)`` from rest at its first command.
-
-        It has at most ``Np`` commanded positions, in :attr:`unit`, as what is predicted; a quantity may have another.
-        SignalError if there are more, or they cannot be used.
-        """
-        factor, predictor = si_factor(self.unit), self.predictor()
-        command = as_samples(x_d, "x_d", factor=factor, T_s=predictor.T_s)
-        if len(command) > predictor.Np:
-            raise SignalError(f"x_d must have at most Np = {predictor.Np} samples, got {len(command)}")
-        found, scale = predictor.predict(command), 1.0 / factor("")
-        return replace(found, x_pb=scale * found.x_pb, e_h=scale * found.e_h, x_h_std=scale * found.x_h_std)
-
-    def plot(self) -> "Figure":
-        """Return a matplotlib figure of the errors over the held-out samples."""
-        scale, unit = self.judged.unit
-        errors: Array = scale * self.judged.replay.errors()
-        lines = dict(zip(("physics model", "hold", "hybrid"), errors, strict=True))
-        t: Array = self.machine.T_s * np.arange(float(errors.shape[1]))
-        return line_plot(t, lines, "t [s]", f"error x − x̂ [{unit}]")
-
-    def report(self, path: str | Path, fmus: Sequence[str] = (), *, in_position: float | None = None) -> None:
-        """Write the report, one HTML file that needs nothing else, also about FMUs with these names of files.
-
-        With a window ``in_position``, m or rad, it says how long moves take to settle within it, and which are worst.
-
-        OSError if it cannot be written, or ``path`` is a folder.
-        """
-        if as_path(path).is_dir():
-            raise IsADirectoryError(errno.EISDIR, "the report's path must be a file", str(path))
-        fmus, judged = [fmus] if isinstance(fmus, str) else fmus, self.judged
-        check_kind(Sequence, fmus=fmus)
-        report = sections.begun_report(
-            *(f"Axis {self.machine.name}: from its log to its FMU", self.logs, judged, "Tested on held-out samples"),
-            "The first half of each log trained the physics model and chose the settings; these are the errors of the "
-            f"second half.{settling_words(judged.replay)}",
-        )
-        if in_position is not None:
-            sections.write_moves(report, judged, finite(in_position, "in_position", above=0.0))
-        sections.write_findings(report, self.logs, self.findings)
-        sections.write_identification(report, self.identification, judged)
-        sections.write_validation(report, self.identification, judged)
-        sections.write_settings(report, self.choice, judged)
-        if self.tracking is not None:
-            report.heading("Compensation")
-            for line in self.tracking.lines(judged.shown):
-                report.paragraph(line)
-            if self.tracking.look_aheads is not None:
-                title, head, rows = self.tracking.look_aheads.figures(judged.shown)
-                report.paragraph(f"{title}:")
-                report.table(head, rows, words=3)
-        if fmus:
-            sections.write_use(report, fmus[0], judged.T_s, judged.replay.Np, self.logs[0])
-            report.paragraph(f"{' and '.join(fmus)} start trained with the log.")
-        report.write(path)
-
-    def build(
-        self,
-        out: str | Path,
-        *,
-        fmus: bool = True,
-        report: bool = True,
-        in_position: float | None = None,
-        progress: Progress = lambda _message, _done: None,
-    ) -> dict[str, Path]:
-        """Write the files of :func:`~hybridsep.fitting.build.fit_files` to a folder; return them, by what they are.
-
-        ``fmus`` and ``report`` say whether they are among them; ``in_position`` is the report's; ``progress`` is
-        told a message and the fraction done.
-        """
-        out = as_path(out, "out")
-        check_kind(Callable, progress=progress)
-        if out.exists() and not out.is_dir():
-            raise NotADirectoryError(errno.ENOTDIR, "out must be a folder", str(out))
-        files = fit_files(out, self.machine.name, compensator=self.tracking is not None)
-        archives = {what: path for what, path in files.items() if path.suffix == ".fmu"}
-        for what in [*([] if report else ["report"]), *([] if fmus else archives)]:
-            del files[what]
-        comments = [self.identification.structure]  # and what is no measurement
-        if self.machine.plant is not None:
-            comments.append(f"[plant]: {self.plant.words(self.judged.shown)}")
-        if self.machine.drive_limits is not None and self.machine.drive_limits.estimated:
-            comments.append(f"[drive_limits]: {LIMITS_WORDS}")
-        write_whole(files["machine file"], machine_text(self.machine, comments=comments))
-        commands = commands_to_try(self.judged.replay.recordings)
-        write_commands(files["commands to try"], commands, self.machine.T_s, self.logs[0].shown)
-        write_whole(files["trained predictor"], self.trained)
-        for i, (what, path) in enumerate(archives.items() if fmus else ()):
-            progress(f"build the {what}", i / len(archives))
-            build_fmu(self.machine, path.stem, path.parent, weights=files["trained predictor"])
-        if report:
-            self.report(files["report"], [path.name for path in archives.values() if fmus], in_position=in_position)
-        hashes = {path.name: sha256_of(path) for what, path in files.items() if what != "results"}
-        written = {"logs": [str(log.path.resolve()) for log in self.logs], "files": hashes}
-        results = {"hybridsep": __version__, **self.results(), "written": written}
-        write_whole(files["results"], json.dumps(results, indent=2) + "\n")
-        progress("done", 1.0)
-        return files
-
-    def results(self) -> dict[str, Any]:
-        """Return plain values for JSON, as in ``fit.json``: errors in m over the test samples."""
-        return {
-            "identification": self.identification.summary(),
-            "choice": plain(self.choice),
-            "plant": plain(self.plant),
-            "tracking": plain(self.tracking) or {},
-            "judged": plain(self.judged.replay.figures()),
-            "controller": plain(self.judged.controller) or {},
-        }
 
 
 @one_blas_thread
@@ -272,7 +72,7 @@ def fit(
         Numbers of lags to choose from; some shares of ``Np`` if left out, none longer than a compensator's window.
     look_ahead : float, optional
         That the controller has for a compensator, s; what the model needs if left out
-        (:meth:`~hybridsep.model.physics.ModalModel.look_ahead`).
+        (:meth:`~hybridsep.model.physics.ModalModel.needed_preview`).
     cascade : mapping, optional
         Gains of the loop, by the names of :class:`~hybridsep.base.settings.Cascade`: the physics model is theirs, and
         what the log says of them is among the findings of the identification.
@@ -346,7 +146,7 @@ def fit(
     if period := period_finding(model, recordings, default, shown):
         found = replace(found, findings=(*found.findings, period))
     tried = beginnings(recordings, _TRIED_MAX)
-    needed = model.look_ahead(T_s, default.input_hold)
+    needed = model.needed_preview(T_s, default.input_hold)
     ahead = needed if ahead is None else ahead
     # A compensator has shorter windows, and what the predictor has learned is to serve it, too
     limits: dict[str, Any] = {**estimated_limits(recordings, T_s), **given_limits}
@@ -426,7 +226,7 @@ def _machine(
     compensation = {"drive_limits": dict(limits)} if limits else {}
     known = {key: value for key in PredictorSettings.KNOWN if (value := getattr(settings, key))}
     if limits:  # as numbers, for whoever reads the file, and at least as many samples in a window as there are lags
-        needed, T_s = model.look_ahead(settings.T_s, settings.input_hold), settings.T_s
+        needed, T_s = model.needed_preview(settings.T_s, settings.input_hold), settings.T_s
         given = given.for_window(Np := given.window(needed, T_s), needed, T_s)
         assert given.spacing is not None
         assert given.preview is not None

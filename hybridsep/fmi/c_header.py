@@ -17,15 +17,15 @@ import struct
 import zlib
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
 from ..base.files import data_folder
 from ..base.parameters import angular_unit
+from .description import filled
 from .flavours import FMI_VERSIONS
-from .variables import INTERPOLATED, FmuTable, Value, Variable
+from .variables import INTERPOLATED, FmuTable, Value, Variable, layout_of
 
 _MODE = {"f_n": 1.0, "zeta": 1.0, "alpha": 1.0, "beta": 0.0}
 _ANY: Mapping[str, Value] = defaultdict(lambda: 1)
@@ -41,46 +41,6 @@ KINDS: Mapping[str, FmuTable] = {
     )
 }
 """Kinds of FMU, each with a table that stands for all FMUs of it."""
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """The parts of an FMU's table: single variables, the modes' variables, more single ones, then windows."""
-
-    scalars: tuple[Variable, ...]
-    modes: tuple[Variable, ...]  # four numbers of each
-    last: tuple[Variable, ...]  # what was added since
-    windows: tuple[tuple[Variable, ...], ...]  # the samples of each window, all windows of one length
-
-    @property
-    def window(self) -> int:
-        """Samples in each window, 0 if there are none."""
-        return len(self.windows[0]) if self.windows else 0
-
-    @property
-    def starts(self) -> list[float]:
-        """Start values of all but windows, which have none; 0 for what is calculated."""
-        return [float(variable.start or 0.0) for variable in self.started]
-
-    @property
-    def started(self) -> tuple[Variable, ...]:
-        """Variables before the windows."""
-        return *self.scalars, *self.modes, *self.last
-
-
-def layout_of(table: Sequence[Variable]) -> _Layout:
-    """Return the parts of a table, which the C core finds by their places."""
-    arrays: dict[str, list[Variable]] = defaultdict(list)
-    for variable in table:
-        array, bracket, _ = variable.name.partition("[")
-        arrays[array if bracket else "last" if "mode" in arrays else ""].append(variable)
-    scalars, modes, last = (tuple(arrays.pop(name, [])) for name in ("", "mode", "last"))
-    windows = tuple(map(tuple, arrays.values()))
-    layout = _Layout(scalars, modes, last, windows)
-    flat = [*layout.started, *(sample for window in windows for sample in window)]
-    assert flat == list(table), "single variables come first, then modes, then single ones, then windows"
-    assert len({len(window) for window in windows}) <= 1, "windows are of one length"
-    return layout
 
 
 def kind_header(kind: str) -> str:
@@ -100,32 +60,18 @@ def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: by
     embedded = (
         ",\n    .weights = hsep_embedded_weights,\n    .weights_size = sizeof hsep_embedded_weights" if weights else ""
     )
-    text = f"""/* What fmi{fmi}Functions.h may put before the names of the FMI functions. */
-#ifndef FMI{fmi}_FUNCTION_PREFIX
-#define FMI{fmi}_FUNCTION_PREFIX {table.name}_
-#endif
-
-#define HSEP_GUID {json.dumps(guid)}
-#define HSEP_N_MODES {len(layout.modes) // len(_MODE)}
-#define HSEP_WINDOW {layout.window} /* samples in each window, 0 where they are left out */
-#define HSEP_N_STARTS (HSEP_N_SCALARS + HSEP_MODE_NUMBERS * HSEP_N_MODES + HSEP_N_LAST)
-#define HSEP_N_VARIABLES (HSEP_N_STARTS + HSEP_N_WINDOWS * HSEP_WINDOW)
-#define HSEP_N_VALUES (HSEP_N_VARIABLES + HSEP_N_INTERPOLATED)
-
-static const double hsep_starts[HSEP_N_STARTS] = {{
-{starts}}};
-
-{learned}static const hsep_context hsep_table = {{
-    .variables = hsep_variables,
-    .n_scalars = HSEP_N_SCALARS,
-    .n_modes = HSEP_N_MODES,
-    .n_last = HSEP_N_LAST,
-    .window = HSEP_WINDOW,
-    .n_variables = HSEP_N_VARIABLES,
-    .starts = hsep_starts,
-    .guid = HSEP_GUID,
-    .angular = {int(table.is_angular)}{embedded}}};
-"""
+    text = filled(
+        "table.h",
+        fmi=fmi,
+        name=table.name,
+        guid=json.dumps(guid),
+        n_modes=len(layout.modes) // len(_MODE),
+        window=layout.window,
+        starts=starts,
+        learned=learned,
+        angular=int(table.is_angular),
+        embedded=embedded,
+    )
     return _header(table.kind, table.name, text)
 
 
@@ -136,20 +82,8 @@ def _interface_number(kind: str) -> int:
 
 def _header(kind: str, whose: str, table: str) -> str:
     """Return a header: the interface of a kind, then a table or where it is."""
-    return f"""/* The interface of {whose}: generated from the table that modelDescription.xml comes from. */
-#ifndef HSEP_FMU_H
-#define HSEP_FMU_H
-
-#include <math.h>
-
-#include "hsep_model.h"
-
-#define HSEP_MODEL_{re.sub("(?<=[a-z])(?=[A-Z])", "_", kind).upper()} 1
-#define HSEP_INTERFACE UINT64_C(0x{_interface_number(kind):016X}) /* of all below, up to the table of one FMU */
-{_interface(kind)}
-{table}
-#endif
-"""
+    model, number = re.sub("(?<=[a-z])(?=[A-Z])", "_", kind).upper(), f"{_interface_number(kind):016X}"
+    return filled("fmu.h", whose=whose, model=model, number=number, interface=_interface(kind), table=table)
 
 
 def _interface(kind: str) -> str:
@@ -172,25 +106,20 @@ def _interface(kind: str) -> str:
     rows += [_row(variable, variable.name.partition(".")[2]) for variable in one]
     rows += [_row(variable, variable.name) for variable in layout.last]
     rows += [_row(window[0], name) for window, name in zip(layout.windows, windows, strict=True)]
-    references, lines = ",\n".join(places), ",\n".join(f"    {row}" for row in rows)
-    return f"""#define HSEP_MODEL_NAME {json.dumps(model)}
-#define HSEP_N_INTERPOLATED {len(slopes)} /* the first variables, inputs with a time derivative */
-#define HSEP_N_SCALARS {len(layout.scalars)}
-#define HSEP_HAS_MODES {int(bool(layout.modes))}
-#define HSEP_N_LAST {len(layout.last)} /* single variables after the modes */
-#define HSEP_N_WINDOWS {len(windows)}
-#define HSEP_VR_LENGTH {"HSEP_VR_Np" if windows else 0} /* of the samples in each window, where there are some */
-
-/* Value references; of the modes' numbers the first one. */
-enum {{
-{references}
-}};
-{macros}
-/* Rows of the table: single variables, the numbers of a mode, single variables again, windows. */
-static const hsep_variable hsep_variables[{len(rows)}] = {{
-{lines}
-}};
-"""
+    return filled(
+        "interface.h",
+        model=json.dumps(model),
+        n_interpolated=len(slopes),
+        n_scalars=len(layout.scalars),
+        has_modes=int(bool(layout.modes)),
+        n_last=len(layout.last),
+        n_windows=len(windows),
+        length="HSEP_VR_Np" if windows else 0,
+        references=",\n".join(places),
+        macros=macros,
+        n_rows=len(rows),
+        rows=",\n".join(f"    {row}" for row in rows),
+    )
 
 
 def c_bytes(name: str, content: bytes) -> str:

@@ -15,10 +15,9 @@ from string import Template
 from xml.etree import ElementTree as ET
 
 from ..base.version import VERSION_DATE, __version__
-from .c_header import layout_of
 from .reference import AGREEMENT
 from .spec import AUTHOR, COPYRIGHT, FmuSpec
-from .variables import INTERPOLATED, FmuTable, Variable
+from .variables import INTERPOLATED, FmuTable, Variable, layout_of
 
 _TEMPLATES = Path(__file__).parent / "templates"
 

@@ -6,6 +6,7 @@ same in all FMUs of a kind. A variable that a kind got later stands after the mo
 This module is packed into the FMUs: it needs nothing but the standard library.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -37,7 +38,9 @@ _NO_MEASUREMENT = (
     "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
 )
 _STD = "standard deviation of x_meas - x_h, now; 0: not known"
-_ALARM = "whether it has tripped: for three samples x_meas - x_d, or its mean with x_meas - x_dm, was over its limit"
+_ALARM = (
+    "whether it tripped: for three samples x_meas - x_d, or its geometric mean with x_meas - x_dm, was over its limit"
+)
 # no input: several masters set all inputs by setReal
 _RESET = "a rising edge ends a trip; what was learned before it stays"
 _LOAD = (
@@ -335,3 +338,43 @@ class FmuTable:
     def named(self, causality: str) -> dict[str, Variable]:
         """Return the variables of a causality by name, in their order."""
         return {variable.name: variable for variable in self.variables if variable.causality == causality}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Parts of an FMU's table: single variables, the modes' variables, more single ones, then windows."""
+
+    scalars: tuple[Variable, ...]
+    modes: tuple[Variable, ...]  # four numbers of each
+    last: tuple[Variable, ...]  # what was added since
+    windows: tuple[tuple[Variable, ...], ...]  # the samples of each window, all windows of one length
+
+    @property
+    def window(self) -> int:
+        """Samples in each window, 0 if there are none."""
+        return len(self.windows[0]) if self.windows else 0
+
+    @property
+    def starts(self) -> list[float]:
+        """Start values of all but windows, which have none; 0 for what is calculated."""
+        return [float(variable.start or 0.0) for variable in self.started]
+
+    @property
+    def started(self) -> tuple[Variable, ...]:
+        """Variables before the windows."""
+        return *self.scalars, *self.modes, *self.last
+
+
+def layout_of(table: Sequence[Variable]) -> Layout:
+    """Return the parts of a table, which the C core finds by their places."""
+    arrays: dict[str, list[Variable]] = defaultdict(list)
+    for variable in table:
+        array, bracket, _ = variable.name.partition("[")
+        arrays[array if bracket else "last" if "mode" in arrays else ""].append(variable)
+    scalars, modes, last = (tuple(arrays.pop(name, [])) for name in ("", "mode", "last"))
+    windows = tuple(map(tuple, arrays.values()))
+    layout = Layout(scalars, modes, last, windows)
+    flat = [*layout.started, *(sample for window in windows for sample in window)]
+    assert flat == list(table), "single variables come first, then modes, then single ones, then windows"
+    assert len({len(window) for window in windows}) <= 1, "windows are of one length"
+    return layout

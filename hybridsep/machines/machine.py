@@ -100,14 +100,14 @@ class Machine(FileSection):
         of the predictor's lags as fit into it.
         """
         own, predictor = self._compensator_entries(PredictorSettings), self.predictor_settings
-        Np = own.setdefault("Np", self._compensation().window(self.look_ahead, self.T_s))
+        Np = own.setdefault("Np", self._compensation().window(self.needed_preview, self.T_s))
         shorter = {"p": min(predictor.p, Np), "q": min(predictor.q, Np - 1)}
         return PredictorSettings(**{**self.predictor, **shorter, **own}, **self._sampling)
 
     @property
     def compensator_settings(self) -> CompensatorSettings:
         """Settings of the compensator, with the ``[drive_limits]`` if there are any."""
-        return self._compensation().for_window(self.compensator_predictor.Np, self.look_ahead, self.T_s)
+        return self._compensation().for_window(self.compensator_predictor.Np, self.needed_preview, self.T_s)
 
     def changed(
         self, section: Literal["", "predictor", "compensator", "plant"], values: Mapping[str, Any]
@@ -189,9 +189,9 @@ class Machine(FileSection):
         return {**predictor.to_fmi(), **self.compensator_settings.to_fmi(), "dead_time": self.physics.dead_time}
 
     @cached_property
-    def look_ahead(self) -> int:
+    def needed_preview(self) -> int:
         """Samples that the drive needs ahead."""
-        return self.model.look_ahead(self.T_s, self.physics.input_hold)
+        return self.model.needed_preview(self.T_s, self.physics.input_hold)
 
     @property
     def _sampling(self) -> dict[str, Any]:

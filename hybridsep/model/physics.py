@@ -23,7 +23,7 @@ from .discrete import BLOCK_MAX, DiscreteModel
 if TYPE_CHECKING:
     import control
 
-_LOOK_AHEAD_MAX = 2000  # longest preview of a compensator, samples
+_PREVIEW_MAX = 2000  # longest preview of a compensator, samples
 MODES_MAX = 100  # largest number of modes; the discrete model's tables grow with its square
 
 
@@ -52,7 +52,7 @@ class Mode:
         return 2 * np.pi * self.f_n
 
 
-def least_look_ahead(T_s: float) -> int:
+def least_preview(T_s: float) -> int:
     """Return the least samples ahead that plans are made for: 0.2 s, which count as 100 at least, and 200 at most."""
     return min(max(100, round(0.2 / T_s)), 200)
 
@@ -130,24 +130,24 @@ class ModalModel:
         """Static gain ``G_pb(0)``; 1 for a drive without steady-state error."""
         return float(sum(mode.alpha / mode.omega**2 for mode in self.modes))
 
-    def look_ahead(self, T_s: float, input_hold: str = "zoh") -> int:
-        """Return the samples ahead that a compensator needs to plan, :data:`_LOOK_AHEAD_MAX` at most.
+    def needed_preview(self, T_s: float, input_hold: str = "zoh") -> int:
+        """Return the samples ahead that a compensator needs to plan, :data:`_PREVIEW_MAX` at most.
 
         A change of the command must act within its plan: three times the time in which the response to a step, dead
         time included, first reaches 95 % of its end, or 1.5 periods of the lowest mode that swings, ζ < 1, and adds 5 %
-        somewhere, and :func:`least_look_ahead`.
+        somewhere, and :func:`least_preview`.
 
         ``T_s``, s, and ``input_hold`` are as of :meth:`discretise`.
         """
         discrete = self.discretise(T_s, input_hold)
-        step, _ = discrete.forced_response(discrete.rest(), np.ones(_LOOK_AHEAD_MAX // 3))
+        step, _ = discrete.forced_response(discrete.rest(), np.ones(_PREVIEW_MAX // 3))
         reached = np.abs(step) >= 0.95 * abs(self.dc_gain)
         rise = int(np.argmax(reached)) if reached.any() else len(step)
         peaks = [(abs(m.alpha) / m.omega**2 + abs(m.beta) / m.omega) * max(1.0, 0.5 / m.zeta) for m in self.modes]
         seen = min(0.05 * abs(self.dc_gain), max(peaks))
         swinging = [mode for mode, peak in zip(self.modes, peaks, strict=True) if peak >= seen and mode.zeta < 1.0]
         periods = [math.ceil(1.5 / mode.f_n / T_s) for mode in swinging]
-        return min(_LOOK_AHEAD_MAX, max(least_look_ahead(T_s), 3 * rise, *periods))
+        return min(_PREVIEW_MAX, max(least_preview(T_s), 3 * rise, *periods))
 
     def state_space(self) -> tuple[Array, Array, Array]:
         """Return ``(A, b, c)`` of the modes, block diagonal, without the dead time.

@@ -18,10 +18,10 @@ from hybridsep import HybridPredictor, load_machine, read_log
 from hybridsep.app.fit import _next_steps
 from hybridsep.base.errors import ParameterError
 from hybridsep.cosim.loop import FmuController
-from hybridsep.fitting.build import fit_files
-from hybridsep.fitting.fit import Fit, fit
+from hybridsep.fitting.fit import fit
 from hybridsep.fitting.identified_plant import IdentifiedPlant
 from hybridsep.fitting.replay import replay, split_log
+from hybridsep.fitting.result import Fit, fit_files
 from hybridsep.fmi.weights import restore_weights, weights_file
 from hybridsep.logs.checks import Finding
 from hybridsep.machines.machine import machine_name

@@ -22,10 +22,11 @@ from hybridsep.base.signals import Array
 from hybridsep.cosim.fir_inverse import FirInverse, PlayedCommand
 from hybridsep.cosim.fmu import read_description
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fitting.compensation import FACTORS, Stretch, binding_words, expected_tracking
+from hybridsep.fitting.compensation import binding_words, expected_tracking
 from hybridsep.fitting.expected import Expected, Trial
 from hybridsep.fitting.limits import drive_limits
 from hybridsep.fitting.replay import Recording
+from hybridsep.fitting.stretch import FACTORS, Stretch
 from hybridsep.fmi.archive import build_fmu
 from hybridsep.identify.model import machine_of
 from hybridsep.logs.units import DisplayUnits

@@ -59,10 +59,9 @@ class CGram:
 class CSolution:
     """Weights of the first features with penalties, as hsep_experts.c solves for them: the tail's are backwards.
 
-    ``gram``: its rows, settled; ``penalties``, (m,): of its first ``m`` features; where these are all, the second
-    half of them is the head, else there is none; ``other``, ``weight``: CGram and float: rows that are added with a
-    weight, settled; ``later``, (k, m + 1): rows ``[φ | target]`` that come once the solution has begun; ``amounts``:
-    list: Multiply-adds that are spent before each of them; what is left is done in the end.
+    ``gram``: its rows, settled; ``penalties``, (m,): of its first ``m`` features; of all, their second half is
+    the head; ``other``: rows that are added with a ``weight``, settled; ``later``, (k, m + 1): rows ``[φ | target]``
+    that come once it has begun; ``amounts``: multiply-adds before each of them; what is left is done in the end.
     """
 
     def __init__(
@@ -197,11 +196,7 @@ def test_rows_may_come_while_a_solution_is_made(n: int, n_before: int, amounts: 
 @given(st.integers(1, 40), st.integers(0, 30), st.floats(-3.0, 1.0), st.integers(0, 9))
 @settings(max_examples=50, deadline=None)
 def test_the_last_row_may_tell_more_than_all_others(n: int, n_before: int, size: float, seed: int) -> None:
-    """It enters the factor as far as squares resolve it.
-
-    Of sizes and penalties that are drawn, one programme in forty is so badly conditioned that squares do not resolve it
-    to 1e-10.
-    """
+    """Squares resolve it to 1e-10, but where a programme is badly conditioned, one in forty."""
     gram, library, rows, _ = both(n, n_before + 1, seed)
     penalties = 10.0 ** np.random.default_rng(seed).uniform(-3, 3, n) * np.abs(rows).max(axis=0) ** 2
     last = 10.0**size * np.random.default_rng(seed).normal(size=n + 1) * np.abs(np.append(rows[-1], 1.0))

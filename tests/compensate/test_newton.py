@@ -17,7 +17,7 @@ from hybridsep.base.settings import CompensatorSettings, Limits, PredictorSettin
 from hybridsep.base.signals import Array
 from hybridsep.compensate import newton
 from hybridsep.compensate.compensator import SepCompensator
-from hybridsep.compensate.newton import AveragedPlanner, PlanModel
+from hybridsep.compensate.newton import NewtonSearch, PlanModel
 from hybridsep.compensate.planning import AveragedPlanning, ChosenPlan
 from hybridsep.compensate.splines import SplineBasis
 from hybridsep.cosim.loop import cosimulate
@@ -221,7 +221,7 @@ def test_a_plan_that_is_predicted_to_be_worse_is_rejected(monkeypatch: pytest.Mo
     worse = np.full(3 + sep._basis.n_free, 1e-3)
     for cost in (math.inf, math.nan):
         monkeypatch.setattr(
-            *(AveragedPlanner, "step"),
+            *(NewtonSearch, "step"),
             lambda _, start, *__, cost=cost: (replace(start, coefficients=worse, cost=cost), 0.1),
         )
         plan = sep.plan(x_d)

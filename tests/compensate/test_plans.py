@@ -99,7 +99,7 @@ def test_splines_that_are_solved_for_have_knots_further_apart(n: int, window: in
     assert basis.n_free == n
     splines = solved_splines(n, window)
     assert np.linalg.matrix_rank(splines) == splines.shape[1]
-    k = np.arange(basis.preview)
+    k = np.arange(basis.horizon)
     for one in splines.T:
         begin, count = int(np.flatnonzero(one)[0]), int(np.count_nonzero(one))
         apart = 2 * {1: 1, 5: 2, 13: 4}[count]  # samples between knots

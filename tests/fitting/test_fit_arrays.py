@@ -15,7 +15,7 @@ from staircase_data import commanded, measured
 
 import hybridsep
 from hybridsep.base.errors import LogError, ParameterError, SignalError, StateError
-from hybridsep.fitting.fit import Fit
+from hybridsep.fitting.result import Fit
 from hybridsep.fmi.weights import restore_weights, weights_file
 
 N, NP = 1200, 40

@@ -11,9 +11,9 @@ from hybridsep.base.metrics import rms
 from hybridsep.base.settings import Limits
 from hybridsep.base.signals import Array
 from hybridsep.cosim.loop import cosimulate
-from hybridsep.fitting.compensation import Ahead, LookAheads, Stretch
 from hybridsep.fitting.expected import Trial
 from hybridsep.fitting.replay import Recording
+from hybridsep.fitting.stretch import Ahead, LookAheads, Stretch
 from hybridsep.identify.model import machine_of
 from hybridsep.logs.units import shown_in
 from hybridsep.machines.machine import Machine
@@ -50,7 +50,7 @@ def found() -> LookAheads:
 
 
 def test_a_look_ahead_leaves_what_a_loop_on_the_model_does(found: LookAheads) -> None:
-    assert [one.preview for one in found.tried] == sorted({25, 50, 100, 200, 400, SERVO.look_ahead(T_S)})
+    assert [one.preview for one in found.tried] == sorted({25, 50, 100, 200, 400, SERVO.needed_preview(T_S)})
     assert found.duration == pytest.approx(len(MOVES) * T_S)
     machine = axis(SERVO, 100)
     settings = replace(machine.compensator_settings, compensate="physics")
@@ -108,10 +108,10 @@ def test_the_shortest_look_ahead_that_leaves_as_little(left: dict[int, float], c
 
 
 def test_a_shorter_look_ahead_that_leaves_as_little_is_advised_and_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hybridsep.fitting.compensation._AHEAD", (0.1, 0.2, 0.4))
+    monkeypatch.setattr("hybridsep.fitting.stretch._AHEAD", (0.1, 0.2, 0.4))
     slow = ModalModel([Mode(2.0, 0.9, (4 * np.pi) ** 2)])
     moves = rest_to_rest([0.0, 0.02, -0.01], Limits(0.05, 0.3, 6.0), T_S, start_times=[0.3, 2.0], duration=4.0)
-    discrete, needed = slow.discretise(T_S), slow.look_ahead(T_S)
+    discrete, needed = slow.discretise(T_S), slow.needed_preview(T_S)
     recording = Recording(moves, discrete.forced_response(discrete.rest(), moves)[0], 500)
     long, short = (looked(axis(slow, preview), recording) for preview in (needed, 200))
     assert needed > 600
@@ -123,7 +123,7 @@ def test_a_shorter_look_ahead_that_leaves_as_little_is_advised_and_does(monkeypa
 
 def test_plans_go_on_where_the_limits_are_slow_to_take_the_error_back() -> None:
     moves = rest_to_rest([0.0, 0.05], Limits(0.2, 1.0, 3.0), T_S, start_times=[0.3], duration=1.6)
-    machine = axis(SERVO, SERVO.look_ahead(T_S), acceleration=4.0, jerk=6.0, change_max=0.011)
+    machine = axis(SERVO, SERVO.needed_preview(T_S), acceleration=4.0, jerk=6.0, change_max=0.011)
     stretch = Stretch.of(Trial(machine), [Recording(moves, moves, 500)])
     assert stretch is not None
     left = stretch.expected(machine.compensator_settings, machine.compensator_predictor.Np).compensated
@@ -133,7 +133,7 @@ def test_plans_go_on_where_the_limits_are_slow_to_take_the_error_back() -> None:
 def test_slow_axes_are_tried_with_longer_ones() -> None:
     crane, T_s = ModalModel([Mode(0.25, 0.3, (0.5 * np.pi) ** 2)]), 10 * T_S
     found = looked(replace(axis(crane, 50), T_s=T_s), Recording(MOVES, np.zeros(len(MOVES)), 500))
-    assert [one.preview for one in found.tried][-6:] == [20, 40, 50, 80, 160, crane.look_ahead(T_s)]
+    assert [one.preview for one in found.tried][-6:] == [20, 40, 50, 80, 160, crane.needed_preview(T_s)]
 
 
 def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
@@ -156,7 +156,7 @@ def test_the_most_demanding_stretch_is_taken_wherever_it_is() -> None:
 )
 def test_a_stretch_that_is_cut_out_of_motion_is_led_in_and_out_at_rest(x_d: Array, most: float) -> None:
     """A command that never rests: the largest error was that of its step to rest, where the stretch ends."""
-    with Trial.of(axis(SERVO, SERVO.look_ahead(T_S))) as trial:
+    with Trial.of(axis(SERVO, SERVO.needed_preview(T_S))) as trial:
         stretch = Stretch.of(trial, [Recording(x_d, x_d, 3000)])
         assert stretch is not None
         found = stretch.look_aheads()

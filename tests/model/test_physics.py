@@ -228,10 +228,12 @@ def test_a_look_ahead_counts_the_modes_that_matter() -> None:
     """Periods of the lowest mode, time to 95 % with dead time, a floor; a mode of a thousandth counts for nothing."""
     fast, slow = Mode(25.0, 0.5, (2 * np.pi * 25.0) ** 2, 0.0), Mode(2.0, 0.05, 0.1 * (2 * np.pi * 2.0) ** 2, 0.0)
     trace = Mode(1.33, 1.0, 0.001 * (2 * np.pi * 1.33) ** 2, 0.0)
-    assert ModalModel((fast,)).look_ahead(TS) == 200
-    assert ModalModel((fast, trace)).look_ahead(TS) == 200
-    assert ModalModel((fast, slow)).look_ahead(TS) == 750
+    assert ModalModel((fast,)).needed_preview(TS) == 200
+    assert ModalModel((fast, trace)).needed_preview(TS) == 200
+    assert ModalModel((fast, slow)).needed_preview(TS) == 750
     omega = 2 * np.pi * 1.45
-    assert ModalModel((fast, Mode(1.45, 1.0, 0.034 * omega**2, 0.034 * omega))).look_ahead(TS) == 200  # it only creeps
-    late = ModalModel((fast,), dead_time=100).look_ahead(TS)
+    assert (
+        ModalModel((fast, Mode(1.45, 1.0, 0.034 * omega**2, 0.034 * omega))).needed_preview(TS) == 200
+    )  # it only creeps
+    late = ModalModel((fast,), dead_time=100).needed_preview(TS)
     assert 3 * (100 + 10) < late < 3 * (100 + 30)

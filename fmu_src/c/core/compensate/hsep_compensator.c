@@ -58,7 +58,7 @@ HSEP_API void hsep_compensator_block_init(
 
 static hsep_int compensator_horizon(const hsep_compensator *self)
 {
-    return hsep_planner_splines(hsep_part_const(self, self->planner))->preview;
+    return hsep_planner_splines(hsep_part_const(self, self->planner))->horizon;
 }
 
 static hsep_newton_task compensator_task(hsep_compensator *self)
@@ -170,7 +170,7 @@ static void compensator_publish(hsep_compensator *self, hsep_int last)
     if (self->averaged) { /* the window's part of the preview, and what is late before it */
         const hsep_newton *averaged = hsep_compensator_newton(self);
         hsep_copy(
-            hsep_at(predictor, predictor->e_h), hsep_at_const(averaged, averaged->e_h) + (averaged->preview - Np),
+            hsep_at(predictor, predictor->e_h), hsep_at_const(averaged, averaged->e_h) + (averaged->horizon - Np),
             predictor->n);
     } else {
         hsep_predictor_predict(predictor, first, last);

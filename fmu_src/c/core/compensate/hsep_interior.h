@@ -46,7 +46,7 @@ typedef struct {
     hsep_real *v, *x;      /* m; m, result, from 0 */
     hsep_real *inner;      /* m, the iterate farthest inside the bounds without their margin, if one is */
     hsep_real *r_d, *dx;   /* (n,) dual residual v - P x + B' z, and step */
-    hsep_real *low, *high; /* (4 preview,) in shares, before the beginning; then rows of x or dx, or for A', and work */
+    hsep_real *low, *high; /* (4 horizon,) in shares, before the beginning; then rows of x or dx, or for A', and work */
     hsep_real *b, *s, *z;  /* (m,) shares; slack s = B x - b and multiplier z, m2, both > 0 */
     hsep_real *inverse;    /* (m,) 1 / (s + rho z) */
     hsep_real *r_c, *r_p;  /* (m,) complementarity that a step aims at, times inverse; primal residual B x - b - s */
@@ -137,9 +137,9 @@ static hsep_real interior_move(hsep_problem it)
 }
 
 /* Walk the arrays of n splines; return the bytes of the block. block: NULL where only its size is asked for. */
-static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n, hsep_problem *it)
+static hsep_real interior_lay_out(hsep_real *block, hsep_int horizon, hsep_int n, hsep_problem *it)
 {
-    const hsep_real columns = (hsep_real)n, rows = HSEP_ORDERS * (hsep_real)preview, work = rows + 4 * HSEP_LANES_MOST;
+    const hsep_real columns = (hsep_real)n, rows = HSEP_ORDERS * (hsep_real)horizon, work = rows + 4 * HSEP_LANES_MOST;
     const hsep_real others[] = {
         rows, work, hsep_triangle(n), columns + 2.0 * HSEP_KNOTS_NEAR, HSEP_KNOTS_WIDTH * columns};
     hsep_real **const arrays[] = {&it->x,  &it->v,   &it->inner,   &it->r_d,    &it->dx,  &it->b,
@@ -154,10 +154,10 @@ static hsep_real interior_lay_out(hsep_real *block, hsep_int preview, hsep_int n
 }
 
 /* bytes of the block, counted as a number */
-static hsep_real hsep_interior_size(hsep_int preview, hsep_int n)
+static hsep_real hsep_interior_size(hsep_int horizon, hsep_int n)
 {
     hsep_problem arrays;
-    return interior_lay_out(NULL, preview, n, &arrays);
+    return interior_lay_out(NULL, horizon, n, &arrays);
 }
 
 static hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_splines *splines)
@@ -168,10 +168,10 @@ static hsep_problem hsep_interior_problem(hsep_interior *self, const hsep_spline
         .first = splines->n - self->knots.n,
         .n = self->knots.m,
         .rho = self->rho};
-    (void)interior_lay_out((hsep_real *)self, splines->preview, splines->n, &it);
+    (void)interior_lay_out((hsep_real *)self, splines->horizon, splines->n, &it);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         const hsep_int begin = it.first * splines->spacing + 1; /* a spline begins with 0 */
-        it.range[order].begin = begin + order * splines->preview;
+        it.range[order].begin = begin + order * splines->horizon;
         it.range[order].count = (it.first + it.knots->end + 3) * splines->spacing + order - begin;
         it.m += 2 * it.range[order].count;
     }

@@ -1,4 +1,4 @@
-/* Linearisation of the residual model with averaging (online model averaging) in the commands, over a preview.
+/* Linearisation of the residual model with averaging (online model averaging) in the commands, over a plan's horizon.
  *
  * Disturbances are not affine in the commands, so a plan uses their slope at given commands, which is sech^2(v / v_i)
  * for friction, and 2 |x| for stiffness. Stop operators, the weights of the experts and of the stack, and the shrinking
@@ -17,7 +17,7 @@
 
 typedef struct {
     hsep_int n;       /* samples of a prediction, */
-    hsep_int preview; /* and its last ones, which a change may reach: all but what is late */
+    hsep_int horizon; /* and its last ones, which a change may reach: all but what is late */
     hsep_int count;   /* disturbances */
     hsep_int moves;   /* samples in which v_d of a change, or of the sample before, is not 0 */
     /* Oldest first; of experts: of all that rows train, one after the other; abreast: HSEP_PHYSICS_ABREAST columns side
@@ -26,14 +26,14 @@ typedef struct {
     hsep_int gains;       /* (5, n) of experts: gains of disturbances and their differences, from v_d now and a sample
                            * before, from x now and in the two samples before */
     hsep_int shrink;      /* (n,) of experts: share of each one in the stack */
-    hsep_int commands;    /* (1 + preview,) of a change, with one sample before it, */
-    hsep_int velocity;    /* (2 + preview,) v_d of a change, with two samples before it, */
-    hsep_int position;    /* (2 + preview,) and it after G_pb */
-    hsep_int base;        /* (preview,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
-    hsep_int response;    /* (preview + 3,) of experts: the response to it, of x_pb's features or of the command */
-    hsep_int run;         /* (preview + 3,) abreast: work of a recursion; one: newest first */
+    hsep_int commands;    /* (1 + horizon,) of a change, with one sample before it, */
+    hsep_int velocity;    /* (2 + horizon,) v_d of a change, with two samples before it, */
+    hsep_int position;    /* (2 + horizon,) and it after G_pb */
+    hsep_int base;        /* (horizon,) of a change: (1 - pi_A) G_pb + pi_A after the dead time, */
+    hsep_int response;    /* (horizon + 3,) of experts: the response to it, of x_pb's features or of the command */
+    hsep_int run;         /* (horizon + 3,) abreast: work of a recursion; one: newest first */
     hsep_int lags;        /* (p + 3,) weights of the lags, as often as a vector has lanes */
-    hsep_int disturbance; /* (preview + 3,) abreast: disturbances that a change makes, */
+    hsep_int disturbance; /* (horizon + 3,) abreast: disturbances that a change makes, */
     hsep_int drive;       /* and these after G_pb */
     hsep_int physics;     /* G_pb at rest, */
     hsep_int filters;     /* and of each column */
@@ -62,28 +62,28 @@ static hsep_int hsep_linearised_experts(hsep_averaged *model)
     return count;
 }
 
-/* The response of an expert, (preview + 3,), to a change: of the command, or of the features of x_pb. */
+/* The response of an expert, (horizon + 3,), to a change: of the command, or of the features of x_pb. */
 static hsep_real *linearised_response(hsep_linearised *self, hsep_int i)
 {
-    return hsep_at(self, self->response) + i * (self->preview + LINEARISED_TOGETHER - 1);
+    return hsep_at(self, self->response) + i * (self->horizon + LINEARISED_TOGETHER - 1);
 }
 
 static hsep_real hsep_linearised_lay_out(hsep_linearised *self, const hsep_predictor_parameters *parameters)
 {
-    const hsep_real n = (hsep_real)hsep_predicted(parameters), preview = (hsep_real)parameters->horizon;
-    const hsep_real padded = preview + (LINEARISED_TOGETHER - 1), lags = (hsep_real)parameters->settings.p;
+    const hsep_real n = (hsep_real)hsep_predicted(parameters), horizon = (hsep_real)parameters->horizon;
+    const hsep_real padded = horizon + (LINEARISED_TOGETHER - 1), lags = (hsep_real)parameters->settings.p;
     const hsep_real filter = hsep_physics_lay_out(&(hsep_physics){0}, parameters);
     hsep_real end = HSEP_WORDS(hsep_linearised);
     self->n = hsep_predicted(parameters);
-    self->preview = parameters->horizon;
+    self->horizon = parameters->horizon;
     self->count = hsep_disturbances_count(parameters);
     self->slopes = hsep_take(&end, n * (hsep_real)self->count);
     self->gains = hsep_take(&end, n * LINEARISED_GAINS * HSEP_N_REGRESSIONS);
     self->shrink = hsep_take(&end, n * HSEP_N_REGRESSIONS);
-    self->commands = hsep_take(&end, 1.0 + preview);
-    self->velocity = hsep_take(&end, preview + LINEARISED_BEFORE);
-    self->position = hsep_take(&end, preview + LINEARISED_BEFORE);
-    self->base = hsep_take(&end, preview);
+    self->commands = hsep_take(&end, 1.0 + horizon);
+    self->velocity = hsep_take(&end, horizon + LINEARISED_BEFORE);
+    self->position = hsep_take(&end, horizon + LINEARISED_BEFORE);
+    self->base = hsep_take(&end, horizon);
     self->response = hsep_take(&end, padded * HSEP_N_REGRESSIONS);
     self->run = hsep_take(&end, padded * HSEP_PHYSICS_ABREAST);
     self->lags = hsep_take(&end, HSEP_LANES_MOST * (lags + (LINEARISED_TOGETHER - 1)));
@@ -145,7 +145,7 @@ static void linearised_span(hsep_linearised *self, const hsep_real weights[], hs
 {
     const hsep_real *commands = hsep_at(self, self->commands);
     for (hsep_int begin = 0, end = HSEP_FEATURES_SPAN, i = 0; i < HSEP_FEATURES_N_SPANS; i++) {
-        for (hsep_int u = dead_time + begin; u < self->preview; u++) {
+        for (hsep_int u = dead_time + begin; u < self->horizon; u++) {
             const hsep_int after = u - dead_time;
             to[u] += weights[i] * (commands[1 + after - begin] - commands[after >= end ? 1 + after - end : 0]);
         }
@@ -154,21 +154,21 @@ static void linearised_span(hsep_linearised *self, const hsep_real weights[], hs
     }
 }
 
-/* Response of an expert of the command to the increments of a change of n samples, from rest, (preview,). */
+/* Response of an expert of the command to the increments of a change of n samples, from rest, (horizon,). */
 static void linearised_of_increments(
     hsep_linearised *self, const hsep_expert *expert, hsep_int n, hsep_int dead_time, hsep_real to[])
 {
     const hsep_real *weights = hsep_expert_weights(expert), *lag_weights = weights + expert->n_static;
     const hsep_real *commands = hsep_at(self, self->commands);
     hsep_real *run = hsep_at(self, self->run);
-    for (hsep_int u = 0; u < self->preview; u++) {
+    for (hsep_int u = 0; u < self->horizon; u++) {
         const hsep_int end = dead_time + n; /* the command changes in samples dead_time ... end */
         hsep_real drive = 0.0;
         for (hsep_int i = u + 1 > end ? u + 1 - end : 1; i < expert->n_static && i + dead_time <= u + 1; i++) {
             const hsep_real *before = commands + (u + 1 - i - dead_time);
             drive += weights[i] * (before[1] - before[0]);
         }
-        hsep_real *e = run + (self->preview - 1 - u);
+        hsep_real *e = run + (self->horizon - 1 - u);
         *e = hsep_recur(drive, lag_weights, e + 1, hsep_min(u, expert->p));
         to[u] = *e;
     }
@@ -209,7 +209,7 @@ static void linearised_slopes(
 }
 
 /* Begin to linearise a model that has learned, for a change of the commands that may begin at any sample of the
- * preview: what does not depend on the commands. change: (preview,) m, oldest first, 0 after the first n;
+ * horizon: what does not depend on the commands. change: (horizon,) m, oldest first, 0 after the first n;
  * passed: the same after G_pb. */
 static void hsep_linearised_begin(
     hsep_linearised *self, hsep_averaged *model, const hsep_real change[], const hsep_real passed[], hsep_int n)
@@ -219,17 +219,17 @@ static void hsep_linearised_begin(
     hsep_real *commands = hsep_at(self, self->commands); /* the change as x_d, v_d and x */
     hsep_real *velocity = hsep_at(self, self->velocity) + LINEARISED_BEFORE;
     hsep_real *position = hsep_at(self, self->position) + LINEARISED_BEFORE;
-    for (hsep_int u = 0; u < self->preview; u++) {
+    for (hsep_int u = 0; u < self->horizon; u++) {
         commands[1 + u] = change[u];
         velocity[u] = (commands[1 + u] - commands[u]) / T_s;
         position[u] = passed[u];
     }
-    self->moves = hsep_min(n + 2, self->preview);
+    self->moves = hsep_min(n + 2, self->horizon);
     /* What is neither friction nor stiffness: the change filtered by G_pb, and as late as the experts of the command
      * take it, and their response to it */
     const hsep_int dead_time = hsep_averaged_command(model)->dead_time;
     hsep_real *base = hsep_at(self, self->base);
-    hsep_copy(base, passed, self->preview);
+    hsep_copy(base, passed, self->horizon);
     for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
         const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
         const hsep_real weight = linearised_weight(model, i, HSEP_COMMAND_RESIDUAL);
@@ -237,18 +237,18 @@ static void hsep_linearised_begin(
             const hsep_int n_passed = first - 1 - HSEP_FEATURES_N_SPANS;
             const hsep_real *weights = hsep_expert_weights(expert) + 1;
             hsep_real *response = linearised_response(self, i), *difference = hsep_at(self, self->run);
-            hsep_zero(response, self->preview);
-            hsep_copy(difference, passed, self->preview);
+            hsep_zero(response, self->horizon);
+            hsep_copy(difference, passed, self->horizon);
             for (hsep_int j = 0; j < n_passed; j++) { /* of x_pb itself and its differences */
-                hsep_axpy(response, weights[j], difference, self->preview);
-                for (hsep_int u = self->preview; u-- > 1;) {
+                hsep_axpy(response, weights[j], difference, self->horizon);
+                for (hsep_int u = self->horizon; u-- > 1;) {
                     difference[u] -= difference[u - 1];
                 }
             }
             linearised_span(self, weights + n_passed, dead_time, response);
         } else if (weight > 0.0) {
             linearised_of_increments(self, expert, n, dead_time, linearised_response(self, i));
-            for (hsep_int u = 0; u < self->preview; u++) {
+            for (hsep_int u = 0; u < self->horizon; u++) {
                 base[u] += weight * ((u < dead_time ? 0.0 : commands[1 + u - dead_time]) - passed[u]);
             }
         }
@@ -283,7 +283,7 @@ static void hsep_linearised_at(
 /* Disturbances in expert i by a change that begins at sample first, as column c of the columns abreast. */
 static void linearised_disturbance(hsep_linearised *self, hsep_int i, hsep_int first, hsep_int c)
 {
-    const hsep_int n = self->n, count = self->preview - first, moves = hsep_min(self->moves, count);
+    const hsep_int n = self->n, count = self->horizon - first, moves = hsep_min(self->moves, count);
     const hsep_real *gains = hsep_at(self, self->gains) + i * LINEARISED_GAINS * n + (n - count);
     const hsep_real *x_2 = hsep_at(self, self->position), *x_1 = x_2 + 1, *x = x_1 + 1; /* the samples before, now */
     const hsep_real *v_1 = hsep_at(self, self->velocity) + 1, *v_d = v_1 + 1;
@@ -332,15 +332,15 @@ static void linearised_add(
     hsep_real *const columns[HSEP_PHYSICS_ABREAST])
 {
     const hsep_expert *expert = hsep_averaged_expert(model, HSEP_REGRESSIONS + i);
-    const hsep_int parts = (self->preview - first + LINEARISED_TOGETHER - 1) / LINEARISED_TOGETHER; /* of a recursion */
+    const hsep_int parts = (self->horizon - first + LINEARISED_TOGETHER - 1) / LINEARISED_TOGETHER; /* of a recursion */
     const hsep_int padded = parts * LINEARISED_TOGETHER;
     hsep_real *run = hsep_at(self, self->run);
     const hsep_int words = self->filters - self->physics;
     hsep_physics *filters[HSEP_PHYSICS_ABREAST];          /* G_pb, each from rest */
     for (hsep_int c = 0; c < HSEP_PHYSICS_ABREAST; c++) { /* columns that are shorter, or none, end with zeros */
-        const hsep_int begin = c < count ? first + c * spacing : self->preview;
+        const hsep_int begin = c < count ? first + c * spacing : self->horizon;
         linearised_disturbance(self, i, begin, c);
-        for (hsep_int u = self->preview - begin; u < padded; u++) {
+        for (hsep_int u = self->horizon - begin; u < padded; u++) {
             hsep_at(self, self->disturbance)[HSEP_PHYSICS_ABREAST * u + c] = 0.0;
         }
         filters[c] = hsep_part(self, self->filters + c * words);
@@ -354,7 +354,7 @@ static void linearised_add(
     }
     linearised_run(lags, expert->p, hsep_at(self, self->drive), linearised_response(self, i), run, padded);
     for (hsep_int c = 0; c < count; c++) {
-        const hsep_int length = self->preview - first - c * spacing;
+        const hsep_int length = self->horizon - first - c * spacing;
         const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - length);
         for (hsep_int u = 0; u < length; u++) {
             columns[c][u] += shrink[u] * run[HSEP_PHYSICS_ABREAST * u + c];
@@ -362,14 +362,14 @@ static void linearised_add(
     }
 }
 
-/* Changes of x_h, m, by that change of the commands where it begins at the samples first + c spacing of the preview, c
- * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (preview - first - c spacing,). */
+/* Changes of x_h, m, by that change of the commands where it begins at the samples first + c spacing of the horizon, c
+ * < count <= HSEP_PHYSICS_ABREAST: columns[c] is (horizon - first - c spacing,). */
 static void hsep_linearised_columns(
     hsep_linearised *self, hsep_averaged *model, hsep_int first, hsep_int spacing, hsep_int count,
     hsep_real *const columns[HSEP_PHYSICS_ABREAST])
 {
     for (hsep_int c = 0; c < count; c++) { /* what does not pass through the disturbances */
-        const hsep_int length = self->preview - first - c * spacing;
+        const hsep_int length = self->horizon - first - c * spacing;
         hsep_copy(columns[c], hsep_at(self, self->base), length);
         for (hsep_int i = 0; i < HSEP_N_REGRESSIONS; i++) {
             const hsep_real *shrink = hsep_at(self, self->shrink) + i * self->n + (self->n - length);

@@ -11,31 +11,31 @@ HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_p
 {
     const hsep_knots knots = hsep_planner_knots(parameters);
     const hsep_int spacing = parameters->compensator.spacing, n = hsep_splines_count(parameters->horizon, spacing);
-    const hsep_real all = (hsep_real)hsep_predicted(parameters), preview = (hsep_real)parameters->horizon;
+    const hsep_real all = (hsep_real)hsep_predicted(parameters), horizon = (hsep_real)parameters->horizon;
     const hsep_real filter = hsep_physics_lay_out(&(hsep_physics){0}, parameters), m = (hsep_real)knots.m;
     const hsep_real coefficients = HSEP_N_DECIDED + (hsep_real)n;
     hsep_real end = HSEP_WORDS(hsep_newton);
-    self->preview = parameters->horizon;
+    self->horizon = parameters->horizon;
     self->late = hsep_late(&parameters->settings);
     self->Np = parameters->settings.Np;
     self->n = n;
     self->m = knots.m;
     const int few = (n - knots.n) * spacing < HSEP_NEWTON_TWICE;
-    self->n_steps = few ? 1 : HSEP_NEWTON_THRICE * self->Np <= self->preview ? 2 : 3;
+    self->n_steps = few ? 1 : HSEP_NEWTON_THRICE * self->Np <= self->horizon ? 2 : 3;
     self->rest = hsep_take(&end, coefficients);
     self->best = hsep_take(&end, coefficients);
     self->of_physics = hsep_take(&end, coefficients);
     self->command = hsep_take(&end, all);
     self->x_pb = hsep_take(&end, all);
     self->e_h = hsep_take(&end, all + (hsep_real)parameters->settings.p);
-    self->target = hsep_take(&end, preview);
-    self->weight = hsep_take(&end, preview);
+    self->target = hsep_take(&end, horizon);
+    self->weight = hsep_take(&end, horizon);
     self->corrected = hsep_take(&end, (hsep_real)n);
     self->begins = hsep_take(&end, m);
-    self->shapes = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
-    self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * preview);
+    self->shapes = hsep_take(&end, HSEP_KNOTS_LEVELS * horizon);
+    self->passed = hsep_take(&end, HSEP_KNOTS_LEVELS * horizon);
     self->gram = hsep_take(&end, hsep_triangle(knots.m));
-    self->W = hsep_take(&end, m * preview);
+    self->W = hsep_take(&end, m * horizon);
     self->linearised = hsep_take_block(&end, hsep_linearised_lay_out(&(hsep_linearised){0}, parameters));
     self->physics = hsep_take_block(&end, filter);
     self->trial = hsep_take_block(&end, filter);
@@ -57,8 +57,8 @@ static void newton_command(hsep_newton *self, const hsep_newton_task *task, cons
     hsep_real *command = hsep_at(self, self->command), *x_pb = hsep_at(self, self->x_pb);
     hsep_physics *trial = hsep_part(self, self->trial);
     hsep_copy(trial, hsep_at(self, self->physics), self->trial - self->physics);
-    for (hsep_int k = 0; k < self->preview; k++) {
-        const hsep_int j = self->preview - 1 - k;
+    for (hsep_int k = 0; k < self->horizon; k++) {
+        const hsep_int j = self->horizon - 1 - k;
         command[j] = task->x_d[k] - task->predictor->start + hsep_splines_sum(splines, c, count, k) + task->load[k];
         x_pb[j] = hsep_physics_respond(trial, command[j]);
     }
@@ -68,7 +68,7 @@ static void newton_command(hsep_newton *self, const hsep_newton_task *task, cons
  * in their largest change from sample to sample over the plan and the late samples. */
 static int newton_outgrows(hsep_newton *self, const hsep_newton_task *task)
 {
-    const hsep_int n = self->preview + self->late;
+    const hsep_int n = self->horizon + self->late;
     newton_command(self, task, hsep_at(self, self->rest), 0);
     const hsep_real of_command = hsep_largest_step(hsep_at(self, self->command), n);
     const hsep_real of_model = hsep_largest_step(hsep_at(self, self->x_pb), n);
@@ -81,8 +81,8 @@ static hsep_real newton_errors(hsep_newton *self, const hsep_newton_task *task)
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *e_h = hsep_at(self, self->e_h);
     const hsep_real *weight = hsep_at(self, self->weight);
     hsep_real *target = hsep_at(self, self->target), squares = 0.0;
-    for (hsep_int k = 0; k < self->preview; k++) {
-        const hsep_int j = self->preview - 1 - k;
+    for (hsep_int k = 0; k < self->horizon; k++) {
+        const hsep_int j = self->horizon - 1 - k;
         target[k] = weight[k] * (task->x_d[k] - task->predictor->start - (x_pb[j] + e_h[j]));
         squares += target[k] * target[k];
     }
@@ -101,8 +101,8 @@ static hsep_real newton_doubt(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_real *weight = hsep_at(self, self->weight), *variance = hsep_at(task->model, task->model->variance);
     hsep_real sum = 0.0;
-    for (hsep_int k = 0; k < self->preview; k++) {
-        sum += weight[k] * weight[k] * variance[self->preview - 1 - k];
+    for (hsep_int k = 0; k < self->horizon; k++) {
+        sum += weight[k] * weight[k] * variance[self->horizon - 1 - k];
     }
     return sum;
 }
@@ -110,10 +110,10 @@ static hsep_real newton_doubt(hsep_newton *self, const hsep_newton_task *task)
 /* Samples that the splines begin with, which are solved for. */
 static hsep_int *newton_begins(hsep_newton *self) { return hsep_part(self, self->begins); }
 
-/* A spline with this distance of knots, or filtered by G_pb, (preview,), of shapes or passed. */
+/* A spline with this distance of knots, or filtered by G_pb, (horizon,), of shapes or passed. */
 static hsep_real *newton_level(hsep_newton *self, hsep_int of, hsep_int level)
 {
-    return hsep_at(self, of) + level * self->preview;
+    return hsep_at(self, of) + level * self->horizon;
 }
 
 /* Begin the physics model's plan at the remainder of the last one, which was predicted last: W' W, W' error. */
@@ -122,13 +122,13 @@ static void newton_open(hsep_newton *self, const hsep_newton_task *task)
     const hsep_real *x_pb = hsep_at(self, self->x_pb), *weight = hsep_at(self, self->weight);
     hsep_real *target = hsep_at(self, self->target), *v = hsep_planner_linear(task->planner);
     const hsep_real change = hsep_averaged_doubts(task->model) ? 1.0 : self->bound;
-    hsep_planner_open(task->planner, task->x_d, self->is_physics ? self->preview : 0, change);
-    for (hsep_int k = 0; k < self->preview; k++) {
-        target[k] = weight[k] * weight[k] * (task->x_d[k] - task->predictor->start - x_pb[self->preview - 1 - k]);
+    hsep_planner_open(task->planner, task->x_d, self->is_physics ? self->horizon : 0, change);
+    for (hsep_int k = 0; k < self->horizon; k++) {
+        target[k] = weight[k] * weight[k] * (task->x_d[k] - task->predictor->start - x_pb[self->horizon - 1 - k]);
     }
     for (hsep_int i = 0; i < self->m; i++) {
         const hsep_int level = hsep_knots_at(&task->planner->knots, i).level, begin = newton_begins(self)[i];
-        v[i] = hsep_dot(newton_level(self, self->passed, level), target + begin, self->preview - begin);
+        v[i] = hsep_dot(newton_level(self, self->passed, level), target + begin, self->horizon - begin);
     }
     hsep_copy(hsep_planner_quadratic(task->planner), hsep_at(self, self->gram), (hsep_int)hsep_triangle(self->m));
     hsep_planner_complete(task->planner, task->planner->jerk_weight);
@@ -156,11 +156,11 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
             newton_level(self, self->passed, knot.level), 4 * distance);
     }
     for (hsep_int c = 0; c < count; c++) {
-        columns[c] = hsep_at(self, self->W) + ((first + c) * self->preview + from + c * distance);
+        columns[c] = hsep_at(self, self->W) + ((first + c) * self->horizon + from + c * distance);
     }
     hsep_linearised_columns(linearised, task->model, from, distance, count, columns);
     for (hsep_int c = 0; c < count; c++) {
-        for (hsep_int k = from + c * distance; k < self->preview; k++) {
+        for (hsep_int k = from + c * distance; k < self->horizon; k++) {
             columns[c][k - from - c * distance] *= weight[k];
         }
     }
@@ -170,7 +170,7 @@ static void newton_columns(hsep_newton *self, const hsep_newton_task *task)
 /* The programme of a Newton step, P = W' W, and its linear term. */
 static void newton_products(hsep_newton *self, hsep_planner *planner)
 {
-    const hsep_int m = self->m, preview = self->preview, *begins = newton_begins(self);
+    const hsep_int m = self->m, horizon = self->horizon, *begins = newton_begins(self);
     const hsep_real *W = hsep_at(self, self->W), *target = hsep_at(self, self->target), *rights[4];
     hsep_real *v = hsep_planner_linear(planner), *P = hsep_planner_quadratic(planner), sums[4];
     for (hsep_int i = 0; i < m; i++) {
@@ -178,13 +178,13 @@ static void newton_products(hsep_newton *self, hsep_planner *planner)
             const hsep_int from = begins[j] > begins[i] ? begins[j] : begins[i]; /* both have begun */
             count = newton_together(planner, j);
             for (hsep_int c = 0; c < 4; c++) {
-                rights[c] = W + ((c < count ? j + c : j) * preview + from);
+                rights[c] = W + ((c < count ? j + c : j) * horizon + from);
             }
-            hsep_dot_four(W + (i * preview + from), rights, preview - from, sums);
+            hsep_dot_four(W + (i * horizon + from), rights, horizon - from, sums);
             hsep_copy(P, sums, count);
             P += count;
         }
-        v[i] = hsep_dot(W + i * preview + begins[i], target + begins[i], preview - begins[i]);
+        v[i] = hsep_dot(W + i * horizon + begins[i], target + begins[i], horizon - begins[i]);
     }
 }
 
@@ -196,12 +196,12 @@ HSEP_API void hsep_newton_init(
     self->reach = HSEP_NEWTON_FIRST_REACH;
     hsep_linearised_init(hsep_part(self, self->linearised), parameters);
     const hsep_splines *splines = hsep_planner_splines(plans);
-    const hsep_int spacing = splines->spacing, preview = self->preview, half = preview / 2;
+    const hsep_int spacing = splines->spacing, horizon = self->horizon, half = horizon / 2;
     const hsep_int full = self->Np > half ? self->Np : half; /* errors that count in full; later ones fall */
     const hsep_real *b = hsep_splines_shape(splines);
     hsep_real *weight = hsep_at(self, self->weight);
-    for (hsep_int k = 0; k < preview; k++) {
-        const hsep_real left = (hsep_real)(preview - k) / (hsep_real)(preview - full + 1);
+    for (hsep_int k = 0; k < horizon; k++) {
+        const hsep_real left = (hsep_real)(horizon - k) / (hsep_real)(horizon - full + 1);
         weight[k] = k < full ? 1.0 : hsep_fmax(HSEP_SPLINES_LEAST, left);
     }
     for (hsep_int i = 0; i < self->m; i++) { /* splines of each distance of knots, and W with only the physics model */
@@ -210,14 +210,14 @@ HSEP_API void hsep_newton_init(
         hsep_real *shape = newton_level(self, self->shapes, knot.level),
                   *passed = newton_level(self, self->passed, knot.level);
         newton_begins(self)[i] = begin;
-        hsep_zero(shape, preview);
-        hsep_zero(passed, preview);
+        hsep_zero(shape, horizon);
+        hsep_zero(passed, horizon);
         for (hsep_int j = 0; j < knot.length; j++) {
             hsep_axpy(shape + j * spacing, knot.share[j], b, 4 * spacing);
-            hsep_axpy(passed + j * spacing, knot.share[j], spline, preview - j * spacing);
+            hsep_axpy(passed + j * spacing, knot.share[j], spline, horizon - j * spacing);
         }
-        for (hsep_int k = begin; k < preview; k++) {
-            hsep_at(self, self->W)[i * preview + k] = weight[k] * passed[k - begin];
+        for (hsep_int k = begin; k < horizon; k++) {
+            hsep_at(self, self->W)[i * horizon + k] = weight[k] * passed[k - begin];
         }
     }
     newton_products(self, plans);
@@ -233,12 +233,12 @@ static hsep_real newton_next_reach(hsep_newton *self, const hsep_newton_task *ta
     hsep_real *change = hsep_at(self, self->target), last = 0.0, squares = 0.0;
     newton_copy(self, change, hsep_planner_coefficients(task->planner));
     hsep_axpy(change, -1.0, hsep_at(self, self->best), n);
-    for (hsep_int k = 0; k < self->preview; k++) {
+    for (hsep_int k = 0; k < self->horizon; k++) {
         const hsep_real delta = hsep_splines_sum(hsep_planner_splines(task->planner), change, n, k);
         squares += (delta - last) * (delta - last);
         last = delta;
     }
-    const hsep_real speed = scale > 0.0 ? hsep_sqrt(squares / (hsep_real)self->preview) / scale : 0.0;
+    const hsep_real speed = scale > 0.0 ? hsep_sqrt(squares / (hsep_real)self->horizon) / scale : 0.0;
     return hsep_fmax(HSEP_NEWTON_LEAST_REACH, HSEP_NEWTON_REACH * speed);
 }
 
@@ -327,7 +327,7 @@ static hsep_int newton_of_columns(hsep_newton *self, const hsep_newton_task *tas
 {
     const hsep_int full = NEWTON_COLUMNS * hsep_linearised_experts(task->model);
     const int begins = first == hsep_knots_at(&task->planner->knots, first).first;
-    return newton_parts(full * (self->preview - newton_begins(self)[first]), self->preview) +
+    return newton_parts(full * (self->horizon - newton_begins(self)[first]), self->horizon) +
            (begins ? NEWTON_SOME : 0);
 }
 
@@ -335,7 +335,7 @@ static hsep_int newton_of_columns(hsep_newton *self, const hsep_newton_task *tas
  * Newton step, rarely tried, adds a prediction where it is, and so does what begins after it. */
 static hsep_int newton_of_plan(hsep_newton *self, const hsep_newton_task *task, hsep_int predicted)
 {
-    const hsep_int window = self->late + self->Np, beyond = self->preview - self->Np;
+    const hsep_int window = self->late + self->Np, beyond = self->horizon - self->Np;
     const hsep_int of_physics = NEWTON_PREDICTION + newton_of_solution(self, 2 * HSEP_NEWTON_PHYSICS_STEPS + 1);
     hsep_int step = NEWTON_SOME + 4 * NEWTON_PREDICTION + newton_of_programme(self) +
                     newton_of_solution(self, 2 * task->planner->steps + 1);
@@ -366,7 +366,7 @@ static void newton_predict(
 static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const hsep_real c[])
 {
     const hsep_int window = self->late + self->Np, stride = self->samples < window ? 1 : HSEP_NEWTON_VARIANCE_STRIDE;
-    const hsep_int end = stride == 1 ? window : self->late + self->preview;
+    const hsep_int end = stride == 1 ? window : self->late + self->horizon;
     newton_predict(self, task, c, hsep_min(self->samples + stride * HSEP_NEWTON_VARIED, end), stride);
 }
 
@@ -411,8 +411,8 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
 /* Make a plan, from one yield to the next. */
 static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 {
-    const hsep_int all = self->late + self->preview;
-    const hsep_int straight = self->n_steps > 2 ? self->preview / HSEP_PLANNING_STRAIGHT : 0;
+    const hsep_int all = self->late + self->horizon;
+    const hsep_int straight = self->n_steps > 2 ? self->horizon / HSEP_PLANNING_STRAIGHT : 0;
     hsep_planner *planner = task->planner;
     hsep_real *c = hsep_planner_coefficients(planner), *rest = hsep_at(self, self->rest);
     hsep_real *of_physics = hsep_at(self, self->of_physics), *corrected = hsep_at(self, self->corrected);
@@ -462,7 +462,7 @@ static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
             }
             NEWTON_YIELD(10, NEWTON_SOME);
             newton_copy(self, c, hsep_at(self, self->best));
-            hsep_planner_open(planner, task->x_d, self->preview - straight, self->bound); /* it follows the friction */
+            hsep_planner_open(planner, task->x_d, self->horizon - straight, self->bound); /* it follows the friction */
             NEWTON_YIELD(11, NEWTON_PREDICTION);
             (void)newton_errors(self, task);
             hsep_linearised_at(
@@ -527,20 +527,20 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
     newton_copy(self, rest, hsep_planner_coefficients(task->planner));
     hsep_copy(hsep_at(self, self->physics), hsep_at_const(predictor, predictor->physics), self->trial - self->physics);
     hsep_copy(
-        hsep_at(self, self->command) + self->preview, hsep_at_const(predictor, predictor->command) + self->Np,
+        hsep_at(self, self->command) + self->horizon, hsep_at_const(predictor, predictor->command) + self->Np,
         self->late);
     hsep_copy(
-        hsep_at(self, self->x_pb) + self->preview, hsep_at_const(predictor, predictor->past_x) + self->Np, self->late);
-    hsep_copy(hsep_at(self, self->e_h) + self->preview + self->late, residuals, predictor->p);
-    for (hsep_int k = 0; k < self->preview; k++) {
-        path[self->preview - 1 - k] = task->x_d[k] - task->predictor->start;
+        hsep_at(self, self->x_pb) + self->horizon, hsep_at_const(predictor, predictor->past_x) + self->Np, self->late);
+    hsep_copy(hsep_at(self, self->e_h) + self->horizon + self->late, residuals, predictor->p);
+    for (hsep_int k = 0; k < self->horizon; k++) {
+        path[self->horizon - 1 - k] = task->x_d[k] - task->predictor->start;
     }
     self->bound = newton_outgrows(self, task) ? HSEP_PLANNING_UNPROVEN : 1.0;
     newton_command(self, task, rest, HSEP_N_DECIDED + self->n);
     const hsep_int pinned = hsep_planner_pinned(task->planner); /* they are published now */
     self->samples = self->late + (pinned > 0 ? pinned : 1);
     hsep_averaged_forecast(
-        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->preview,
+        task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->horizon,
         hsep_at(self, self->e_h), self->samples);
     self->ends = best == 0 && self->planned > 0;
     self->planned = best > 0;

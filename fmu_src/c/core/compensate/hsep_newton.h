@@ -21,7 +21,7 @@
 #define HSEP_NEWTON_VARIED 4 /* variances that are computed in a part */
 
 typedef struct {
-    hsep_int preview, Np;
+    hsep_int horizon, Np;
     hsep_int late;          /* samples before the window that are not measured yet: they are predicted, too */
     hsep_int n, m;          /* splines of a plan, and those that it is solved for */
     hsep_int place;         /* yield after which the plan goes on; 0: at its beginning */
@@ -50,17 +50,17 @@ typedef struct {
     hsep_int rest;          /* (3 + n,) m, coefficients of the remainder of the last plan */
     hsep_int best;          /* (3 + n,) m, coefficients of the best plan so far */
     hsep_int of_physics;    /* (3 + n,) m, coefficients of the physics model's plan */
-    hsep_int command;       /* (preview + late,) m, commands predicted last, relative to the start, newest first */
-    hsep_int x_pb;          /* (preview + late,) m, their prediction by the physics model, */
-    hsep_int e_h;           /* (preview + late + p,) m, and what the averaged model adds; after it the last residuals */
-    hsep_int target;        /* (preview,) m, work */
-    hsep_int weight;        /* (preview,) of the errors of a plan: they count less at its end */
+    hsep_int command;       /* (horizon + late,) m, commands predicted last, relative to the start, newest first */
+    hsep_int x_pb;          /* (horizon + late,) m, their prediction by the physics model, */
+    hsep_int e_h;           /* (horizon + late + p,) m, and what the averaged model adds; after it the last residuals */
+    hsep_int target;        /* (horizon,) m, work */
+    hsep_int weight;        /* (horizon,) of the errors of a plan: they count less at its end */
     hsep_int corrected;     /* (n,) m, what the averaged model's last plan changed the one before by; 0 of any other */
     hsep_int begins;        /* (m,) hsep_int, samples that the splines begin with, which are solved for */
-    hsep_int shapes;        /* (HSEP_KNOTS_LEVELS, preview) splines of each distance of knots, */
-    hsep_int passed;        /* (HSEP_KNOTS_LEVELS, preview) and these after G_pb */
+    hsep_int shapes;        /* (HSEP_KNOTS_LEVELS, horizon) splines of each distance of knots, */
+    hsep_int passed;        /* (HSEP_KNOTS_LEVELS, horizon) and these after G_pb */
     hsep_int gram;          /* triangle of m rows, W' W with G_pb only */
-    hsep_int W;             /* (m, preview) weighted changes of x_h by splines, 0 before they begin */
+    hsep_int W;             /* (m, horizon) weighted changes of x_h by splines, 0 before they begin */
     hsep_int linearised;
     hsep_int physics; /* G_pb at the beginning of the window, */
     hsep_int trial;   /* and for a trial */
@@ -72,13 +72,13 @@ typedef struct {
     hsep_predictor *predictor;
     hsep_averaged *model; /* of the predictor */
     hsep_planner *planner;
-    const hsep_real *x_d;  /* (preview,) m, commanded positions, */
-    const hsep_real *load; /* (preview,) m, and what the drive's load adds to them */
+    const hsep_real *x_d;  /* (horizon,) m, commanded positions, */
+    const hsep_real *load; /* (horizon,) m, and what the drive's load adds to them */
 } hsep_newton_task;
 
 HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_parameters *parameters);
 
-/* Fill the block, which is 0, with the planner that solves its plans, and a spline after G_pb, (preview,), m/m. */
+/* Fill the block, which is 0, with the planner that solves its plans, and a spline after G_pb, (horizon,), m/m. */
 HSEP_API void hsep_newton_init(
     hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 

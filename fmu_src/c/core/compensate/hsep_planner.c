@@ -40,7 +40,7 @@ HSEP_API hsep_knots hsep_planner_knots(const hsep_predictor_parameters *paramete
 HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_predictor_parameters *parameters)
 {
     const hsep_int spacing = parameters->compensator.spacing, n = hsep_splines_count(parameters->horizon, spacing);
-    const hsep_real preview = (hsep_real)parameters->horizon;
+    const hsep_real horizon = (hsep_real)parameters->horizon;
     hsep_real end = HSEP_WORDS(hsep_planner);
     self->Np = parameters->settings.Np;
     self->n_pinned = planner_n_pinned(parameters);
@@ -50,9 +50,9 @@ HSEP_API hsep_real hsep_planner_lay_out(hsep_planner *self, const hsep_predictor
     self->knots = hsep_planner_knots(parameters);
     self->jerk_weight = parameters->compensator.jerk_weight;
     self->c = hsep_take(&end, HSEP_N_DECIDED + (hsep_real)n);
-    self->low = hsep_take(&end, HSEP_ORDERS * preview);
-    self->high = hsep_take(&end, HSEP_ORDERS * preview);
-    self->third = hsep_take(&end, preview);
+    self->low = hsep_take(&end, HSEP_ORDERS * horizon);
+    self->high = hsep_take(&end, HSEP_ORDERS * horizon);
+    self->third = hsep_take(&end, horizon);
     self->P = hsep_take(&end, hsep_triangle(n));
     self->splines = hsep_take_block(&end, hsep_splines_lay_out(&(hsep_splines){0}, parameters->horizon, spacing));
     self->interior = hsep_take_block(&end, hsep_interior_size(parameters->horizon, n));
@@ -79,24 +79,24 @@ HSEP_API void hsep_planner_init(hsep_planner *self, const hsep_predictor_paramet
     }
 }
 
-/* Bounds of the rows of a change beyond the first count coefficients of the last plan's remainder, (4 preview,) in
+/* Bounds of the rows of a change beyond the first count coefficients of the last plan's remainder, (4 n,) in
  * shares: the limits, with a share of change_max, without what x_d and these coefficients take of them. Where x_d
  * exceeds one within the length of a spline, as a command that is held or rounded does, the limit is wider by that. */
 static void planner_limits(
-    const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int preview, hsep_int turns,
-    hsep_real change_max, hsep_real low[], hsep_real high[])
+    const hsep_planner *self, const hsep_real x_d[], hsep_int count, hsep_int n, hsep_int turns, hsep_real change_max,
+    hsep_real low[], hsep_real high[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     /* apart: a sum would be rounded to what a position is, much coarser than a third difference of a change */
     hsep_real path[HSEP_ORDERS], change[HSEP_ORDERS];
-    hsep_splines_exceeded(splines, x_d, self->x_d_before, preview, high);
+    hsep_splines_exceeded(splines, x_d, self->x_d_before, n, high);
     hsep_differ_from(path, self->x_d_before);
     hsep_differ_from(change, self->delta_before);
-    for (hsep_int k = 0; k < preview; k++) {
+    for (hsep_int k = 0; k < n; k++) {
         hsep_differ(path, x_d[k]);
         hsep_differ(change, hsep_splines_sum(splines, hsep_at_const(self, self->c), count, k));
         for (unsigned order = 0; order < HSEP_ORDERS; order++) {
-            const hsep_int r = order * preview + k;
+            const hsep_int r = order * n + k;
             const hsep_real taken = ((order > 0 ? path[order] : 0.0) + change[order]) * splines->share[order];
             const hsep_real exceeded = high[r], room = (1.0 - HSEP_LIMITS_ROUNDING) * (order > 0 ? 1.0 : change_max);
             const int keeps = order == 1 && k >= turns; /* the direction of x_d */
@@ -108,13 +108,13 @@ static void planner_limits(
     }
 }
 
-/* Third differences of delta under the first count coefficients c, (preview,), m; return the sum of their squares. */
+/* Third differences of delta under the first count coefficients c, (horizon,), m; return the sum of their squares. */
 static hsep_real planner_third(const hsep_planner *self, const hsep_real c[], hsep_int count, hsep_real third[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
     hsep_real now[HSEP_ORDERS], squares = 0.0;
     hsep_differ_from(now, self->delta_before);
-    for (hsep_int k = 0; k < splines->preview; k++) {
+    for (hsep_int k = 0; k < splines->horizon; k++) {
         hsep_differ(now, hsep_splines_sum(splines, c, count, k));
         third[k] = now[3];
         squares += third[k] * third[k];
@@ -128,10 +128,10 @@ HSEP_API void hsep_planner_open(hsep_planner *self, const hsep_real x_d[], hsep_
     const hsep_int count = HSEP_N_DECIDED + splines->n;
     hsep_real *low = hsep_at(self, self->low), *high = hsep_at(self, self->high);
     self->solved = self->knots;
-    planner_limits(self, x_d, count, splines->preview, self->no_reversal ? turns : splines->preview, change, low, high);
+    planner_limits(self, x_d, count, splines->horizon, self->no_reversal ? turns : splines->horizon, change, low, high);
     (void)planner_third(self, hsep_at(self, self->c), count, hsep_at(self, self->third));
     /* No change is always feasible, with a small margin: an interior-point method needs an interior */
-    for (hsep_int r = 0; r < HSEP_ORDERS * splines->preview; r++) {
+    for (hsep_int r = 0; r < HSEP_ORDERS * splines->horizon; r++) {
         low[r] = hsep_fmin(low[r], -HSEP_LIMITS_INTERIOR);
         high[r] = hsep_fmax(high[r], HSEP_LIMITS_INTERIOR);
     }
@@ -142,7 +142,7 @@ static hsep_real planner_share(const hsep_planner *self, const hsep_real from[],
 {
     const hsep_real *low = hsep_at_const(self, self->low), *high = hsep_at_const(self, self->high);
     hsep_real share = 1.0;
-    for (hsep_int r = 0; r < HSEP_ORDERS * hsep_planner_splines(self)->preview; r++) {
+    for (hsep_int r = 0; r < HSEP_ORDERS * hsep_planner_splines(self)->horizon; r++) {
         const hsep_real to = hsep_fabs(way[r]), room = way[r] > 0.0 ? high[r] - from[r] : from[r] - low[r];
         if (to > HSEP_LIMITS_ROUNDING && room < share * to) {
             share = room / to;
@@ -168,18 +168,18 @@ static void planner_rows(hsep_planner *self, const hsep_real x[], hsep_real rows
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight)
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int n = self->solved.m, preview = splines->preview;
+    const hsep_int n = self->solved.m, horizon = splines->horizon;
     const hsep_problem problem = planner_problem(self);
     const hsep_real *third = hsep_at(self, self->third), share = splines->share[3];
     hsep_real *P = hsep_planner_quadratic(self), *diagonal = P, largest = 0.0, *rows = problem.low;
-    hsep_zero(rows, HSEP_ORDERS * preview); /* third differences, as rows, without their limit */
-    for (hsep_int k = 0; k < preview; k++) {
-        rows[3 * preview + k] = jerk_weight / (share * share);
+    hsep_zero(rows, HSEP_ORDERS * horizon); /* third differences, as rows, without their limit */
+    for (hsep_int k = 0; k < horizon; k++) {
+        rows[3 * horizon + k] = jerk_weight / (share * share);
     }
     hsep_splines_gram(splines, rows, planner_first(self), problem.products, problem.high);
     hsep_knots_add(&self->solved, problem.products, P, problem.c);
-    for (hsep_int k = 0; k < preview; k++) {
-        rows[3 * preview + k] = -jerk_weight / share * third[k];
+    for (hsep_int k = 0; k < horizon; k++) {
+        rows[3 * horizon + k] = -jerk_weight / share * third[k];
     }
     hsep_zero(problem.c, self->solved.n);
     hsep_splines_transpose(splines, rows, planner_first(self), problem.c);
@@ -202,7 +202,7 @@ HSEP_API void hsep_planner_aim(
     self->solved = hsep_knots_of(splines->n, 0);
     for (hsep_int j = 0; j < splines->n; j++) { /* W' target */
         const hsep_int begin = j * splines->spacing;
-        v[j] = hsep_dot(filtered, target + begin, splines->preview - begin);
+        v[j] = hsep_dot(filtered, target + begin, splines->horizon - begin);
     }
     hsep_splines_filtered_gram(splines, filtered, hsep_planner_quadratic(self));
     hsep_planner_complete(self, jerk_weight);
@@ -223,15 +223,15 @@ static void planner_pin(hsep_planner *self)
 HSEP_API void hsep_planner_end(hsep_planner *self, const hsep_real x_d[])
 {
     const hsep_splines *splines = hsep_planner_splines(self);
-    const hsep_int preview = splines->preview, unknown = self->Np / splines->spacing, n = self->knots.n;
-    hsep_real *spline = planner_problem(self).low, *target = spline + preview;
+    const hsep_int horizon = splines->horizon, unknown = self->Np / splines->spacing, n = self->knots.n;
+    hsep_real *spline = planner_problem(self).low, *target = spline + horizon;
     hsep_planner_open(self, x_d, 0, 1.0);
-    hsep_zero(spline, preview);
+    hsep_zero(spline, horizon);
     hsep_copy(spline, hsep_splines_shape(splines), 4 * splines->spacing);
-    for (hsep_int k = 0; k < preview; k++) {
+    for (hsep_int k = 0; k < horizon; k++) {
         target[k] = -hsep_planner_delta(self, k);
     }
-    const hsep_real gain = 2.0 * hsep_sin(0.5 * HSEP_TWO_PI * HSEP_PLANNING_ENDS / (hsep_real)preview);
+    const hsep_real gain = 2.0 * hsep_sin(0.5 * HSEP_TWO_PI * HSEP_PLANNING_ENDS / (hsep_real)horizon);
     hsep_planner_aim(self, spline, target, hsep_pow(gain, -6.0)); /* gain of a difference at that period */
     planner_pin(self);
     for (hsep_int i = n > unknown ? n - unknown : 0; i < n; i++) {
@@ -266,7 +266,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
         return HSEP_PLAN_FAILED;
     }
     planner_rows(self, free_minimum, problem.low);
-    hsep_zero(problem.high, HSEP_ORDERS * splines->preview);
+    hsep_zero(problem.high, HSEP_ORDERS * splines->horizon);
     if (planner_share(self, problem.high, problem.low) == 1.0) {
         planner_take(self, free_minimum);
         return HSEP_PLAN_DONE;
@@ -274,7 +274,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
     planner_pin(self);
     hsep_tolerance tolerance = planner_tolerance(self->averaging);
     tolerance.steps = steps;
-    for (hsep_int r = 0; r < HSEP_ORDERS * splines->preview; r++) {
+    for (hsep_int r = 0; r < HSEP_ORDERS * splines->horizon; r++) {
         problem.low[r] = hsep_at(self, self->low)[r] + tolerance.margin;
         problem.high[r] = hsep_at(self, self->high)[r] - tolerance.margin;
     }

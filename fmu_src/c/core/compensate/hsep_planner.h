@@ -1,4 +1,4 @@
-/* Receding-horizon planner of the modified command, x_dm = x_d + delta, over a preview. delta is a sum of cubic
+/* Receding-horizon planner of the modified command, x_dm = x_d + delta, over its horizon. delta is a sum of cubic
  * B-splines (hsep_splines.h), each filtered through a linear model (the filtered-basis-functions method: Ramani, Duan,
  * Okwudire and Ulsoy 2017), so that the model's response follows x_d within the drive's limits.
  *
@@ -21,8 +21,8 @@ typedef struct {
     hsep_real jerk_weight;
     hsep_real delta_before[3], x_d_before[3]; /* m, of the samples before the plan */
     hsep_int c;                               /* (3 + n,) m, coefficients */
-    hsep_int low, high; /* (4 preview,) bounds of the rows of a change of the remainder of the last plan, in shares */
-    hsep_int third;     /* (preview,) m, third differences of the remainder of the last plan */
+    hsep_int low, high; /* (4 horizon,) bounds of the rows of a change of the remainder of the last plan, in shares */
+    hsep_int third;     /* (horizon,) m, third differences of the remainder of the last plan */
     hsep_int P;         /* triangle of n rows */
     hsep_int splines, interior;
     hsep_knots knots;  /* of changes of the last plan, */
@@ -66,7 +66,7 @@ static inline hsep_int hsep_planner_pinned(const hsep_planner *self)
     return self->n_pinned * hsep_planner_splines(self)->spacing;
 }
 
-/* Begin a plan, a change of the last one's remainder. x_d: commanded positions, m, (preview,); turns: first samples in
+/* Begin a plan, a change of the last one's remainder. x_d: commanded positions, m, (horizon,); turns: first samples in
  * which it may turn where no_reversal forbids it; change: share of change_max that bounds it. The cost is
  * 1/2 x' P x - v' x of a change by the splines of the planner's knots. The caller sets the triangle P of m rows and v,
  * (m,); hsep_planner_complete adds the jerk's, times a weight, to v, and to P with what makes it positive definite. */
@@ -76,7 +76,7 @@ HSEP_API hsep_real *hsep_planner_linear(hsep_planner *self);
 HSEP_API void hsep_planner_complete(hsep_planner *self, hsep_real jerk_weight);
 
 /* Or set the cost of the tracking error of a linear model, and of the jerk, for a change by all splines. filtered: the
- * spline after it, (preview,); target: x_d minus its response to x_d under the remainder, (preview,) m. */
+ * spline after it, (horizon,); target: x_d minus its response to x_d under the remainder, (horizon,) m. */
 HSEP_API void hsep_planner_aim(
     hsep_planner *self, const hsep_real filtered[], const hsep_real target[], hsep_real jerk_weight);
 
@@ -91,7 +91,7 @@ HSEP_API hsep_plan_status hsep_planner_solve(hsep_planner *self, hsep_int steps)
 /* Do half a step of a bounded plan. */
 HSEP_API hsep_plan_status hsep_planner_advance(hsep_planner *self);
 
-/* Cost of the jerk of a plan, m2, work: (preview,). */
+/* Cost of the jerk of a plan, m2, work: (horizon,). */
 HSEP_API hsep_real hsep_planner_jerk(const hsep_planner *self, const hsep_real c[], hsep_real work[]);
 
 /* Shorten the plan, once it is made, to what keeps the limits whatever follows the known part of x_d, (preview,), m. */

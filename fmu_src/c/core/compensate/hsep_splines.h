@@ -3,7 +3,7 @@
  * Spline j begins at sample j spacing and ends 4 spacings later; the last one ends so that the last four samples of a
  * plan are without change. Splines -3, -2, -1 began before the plan and still act in it. The drive limits the
  * differences of delta of orders 0 to 3. Each of them, as a share of its limit, is a "row": order o at sample k is row
- * o preview + k.
+ * o horizon + k.
  */
 #ifndef HSEP_SPLINES_H
 #define HSEP_SPLINES_H
@@ -15,7 +15,7 @@
 #define HSEP_SPLINES_TOGETHER (4 * HSEP_LANES) /* splines whose products with another one are summed side by side */
 
 typedef struct {
-    hsep_int preview, spacing;
+    hsep_int horizon, spacing;
     hsep_int n;                        /* splines that begin in a plan */
     hsep_real share[HSEP_ORDERS];      /* 1 / limit of an order, 1/m */
     hsep_int shape;                    /* (4 spacing,) b */
@@ -42,10 +42,10 @@ static inline void hsep_differ_from(hsep_real differences[HSEP_ORDERS], const hs
     }
 }
 
-/* Splines that begin in a plan and end four samples before it does, or earlier. preview >= 4 spacing + 3. */
-static inline hsep_int hsep_splines_count(hsep_int preview, hsep_int spacing)
+/* Splines that begin in a plan and end four samples before it does, or earlier. horizon >= 4 spacing + 3. */
+static inline hsep_int hsep_splines_count(hsep_int horizon, hsep_int spacing)
 {
-    return (preview - 4 * spacing - HSEP_SPLINES_END) / spacing + 1;
+    return (horizon - 4 * spacing - HSEP_SPLINES_END) / spacing + 1;
 }
 
 /* The spline itself, b, (4 spacing,). */
@@ -83,12 +83,12 @@ static inline const hsep_real *splines_differences(const hsep_splines *self, uns
 
 static inline hsep_int splines_length(const hsep_splines *self, unsigned order) { return 4 * self->spacing + order; }
 
-static inline hsep_real hsep_splines_lay_out(hsep_splines *self, hsep_int preview, hsep_int spacing)
+static inline hsep_real hsep_splines_lay_out(hsep_splines *self, hsep_int horizon, hsep_int spacing)
 {
     hsep_real end = HSEP_WORDS(hsep_splines);
-    self->preview = preview;
+    self->horizon = horizon;
     self->spacing = spacing;
-    self->n = hsep_splines_count(preview, spacing);
+    self->n = hsep_splines_count(horizon, spacing);
     self->shape = hsep_take(&end, 4.0 * (hsep_real)spacing);
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         self->differences[order] = hsep_take(&end, 4.0 * (hsep_real)spacing + 3.0);
@@ -111,9 +111,9 @@ static inline void hsep_splines_limit(hsep_splines *self, unsigned order, hsep_r
 
 /* Fill the block. limit: of the change, m, and of its differences of orders 1 to 3, m a sample to that power. */
 static inline void hsep_splines_init(
-    hsep_splines *self, hsep_int preview, hsep_int spacing, const hsep_real limit[HSEP_ORDERS])
+    hsep_splines *self, hsep_int horizon, hsep_int spacing, const hsep_real limit[HSEP_ORDERS])
 {
-    (void)hsep_splines_lay_out(self, preview, spacing);
+    (void)hsep_splines_lay_out(self, horizon, spacing);
     for (hsep_int k = 0; k < 4 * spacing; k++) { /* the uniform cubic B-spline on the knots 0, 1, 2, 3, 4 */
         const hsep_real at = (hsep_real)k / (hsep_real)spacing, u = at >= 2.0 ? 4.0 - at : at; /* it is symmetric */
         hsep_at(self, self->shape)[k] = u < 1.0 ? u * u * u / 6.0 : (((-3.0 * u + 12.0) * u - 12.0) * u + 4.0) / 6.0;
@@ -135,20 +135,20 @@ static inline hsep_real hsep_splines_sum(const hsep_splines *self, const hsep_re
     return sum;
 }
 
-/* Rows, (4 preview,), of a change by c, (count,): of spline first - 3, whose last part acts, and those after it. */
+/* Rows, (4 samples,), of a change by c, (count,): of spline first - 3, whose last part acts, and those after it. */
 static inline void hsep_splines_rows(
-    const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int first, hsep_int preview, hsep_real rows[])
+    const hsep_splines *self, const hsep_real c[], hsep_int count, hsep_int first, hsep_int samples, hsep_real rows[])
 {
     const hsep_int spacing = self->spacing;
     const hsep_real s0 = self->share[0], s1 = self->share[1], s2 = self->share[2], s3 = self->share[3];
-    hsep_real *r1 = rows + preview, *r2 = r1 + preview, *r3 = r2 + preview, last = 0.0, last_1 = 0.0, last_2 = 0.0;
-    for (hsep_int k = 0, knot = 0; k < preview; knot++) { /* four splines act from one knot to the next */
+    hsep_real *r1 = rows + samples, *r2 = r1 + samples, *r3 = r2 + samples, last = 0.0, last_1 = 0.0, last_2 = 0.0;
+    for (hsep_int k = 0, knot = 0; k < samples; knot++) { /* four splines act from one knot to the next */
         const hsep_real *b = hsep_splines_shape(self);
         hsep_real a[HSEP_N_DECIDED + 1];
         for (hsep_int i = 0; i <= HSEP_N_DECIDED; i++) {
             a[i] = knot >= first && knot - first + i < count ? c[knot - first + i] : 0.0;
         }
-        for (const hsep_int end = hsep_min(k + spacing, preview); k < end; k++, b++) {
+        for (const hsep_int end = hsep_min(k + spacing, samples); k < end; k++, b++) {
             const hsep_real d = ((a[0] * b[3 * spacing] + a[1] * b[2 * spacing]) + a[2] * b[spacing]) + a[3] * b[0];
             const hsep_real d_1 = d - last, d_2 = d_1 - last_1;
             rows[k] = d * s0, r1[k] = d_1 * s1, r2[k] = d_2 * s2, r3[k] = (d_2 - last_2) * s3;
@@ -188,9 +188,9 @@ static inline void hsep_splines_exceeded(
 static inline void hsep_splines_transpose(const hsep_splines *self, hsep_real rows[], hsep_int first, hsep_real g[])
 {
     const hsep_real *b = hsep_splines_shape(self);
-    const hsep_int preview = self->preview, spacing = self->spacing;
+    const hsep_int horizon = self->horizon, spacing = self->spacing;
     const hsep_real s0 = self->share[0], s1 = self->share[1], s2 = self->share[2], s3 = self->share[3];
-    const hsep_real *r1 = rows + preview, *r2 = rows + 2 * preview, *r3 = rows + 3 * preview;
+    const hsep_real *r1 = rows + horizon, *r2 = rows + 2 * horizon, *r3 = rows + 3 * horizon;
     /* A' = B' (s_0 + D' (s_1 + D' (s_2 + D' s_3))) with the differences D: what later samples say comes first. */
     const hsep_int begin = first * spacing + 1, end = self->n * spacing + 3 * spacing; /* of the change itself */
     const hsep_real a3 = s3 * r3[end + 2], b3 = s3 * r3[end + 1], a2 = s2 * r2[end + 1] + (b3 - a3);
@@ -213,7 +213,7 @@ static inline void splines_products(
     hsep_lanes s0 = {0.0}, s1 = s0, s2 = s0, s3 = s0; /* each has a name, and so a register */
     for (unsigned order = 0; order < HSEP_ORDERS; order++) {
         const hsep_real *before = splines_differences(self, order), *e = before + d * spacing;
-        const hsep_real *of_phase = sorted + order * self->preview + i + d;
+        const hsep_real *of_phase = sorted + order * self->horizon + i + d;
         const hsep_int length = splines_length(self, order), count = length > d * spacing ? length - d * spacing : 0;
         for (hsep_int phase = 0; phase < spacing; phase++) {
             const hsep_real *weight = of_phase + (phase == 0); /* the first difference is 0 */
@@ -222,23 +222,23 @@ static inline void splines_products(
                 const hsep_lanes *w = hsep_lanes_const(weight);
                 s0 += product * w[0], s1 += product * w[1], s2 += product * w[2], s3 += product * w[3];
             }
-            of_phase += (self->preview - phase - 1) / spacing + 1;
+            of_phase += (self->horizon - phase - 1) / spacing + 1;
         }
     }
     hsep_lanes *to = hsep_lanes_at(sums);
     to[0] = s0, to[1] = s1, to[2] = s2, to[3] = s3;
 }
 
-/* The products A' diag(weights) A (hsep_knots_add). work: (4 preview + 4 HSEP_LANES_MOST,), of which the last ones are
+/* The products A' diag(weights) A (hsep_knots_add). work: (4 horizon + 4 HSEP_LANES_MOST,), of which the last ones are
  * read beside others. */
 static inline void hsep_splines_gram(
     const hsep_splines *self, const hsep_real weights[], hsep_int first, hsep_real products[], hsep_real work[])
 {
     const hsep_int n = self->n - first;
     hsep_real sums[HSEP_SPLINES_TOGETHER], *sorted = work; /* rows that are spacing apart become neighbours */
-    for (unsigned order = 0; order < HSEP_ORDERS; order++, weights += self->preview) {
+    for (unsigned order = 0; order < HSEP_ORDERS; order++, weights += self->horizon) {
         for (hsep_int phase = 0; phase < self->spacing; phase++) {
-            for (hsep_int k = phase; k < self->preview; k += self->spacing) {
+            for (hsep_int k = phase; k < self->horizon; k += self->spacing) {
                 *sorted++ = weights[k];
             }
         }
@@ -267,7 +267,7 @@ static inline hsep_real hsep_splines_energy(const hsep_splines *self)
     return sum;
 }
 
-/* The triangle of n rows := W' W of the filtered splines, W's columns being the filtered spline, (preview,),
+/* The triangle of n rows := W' W of the filtered splines, W's columns being the filtered spline, (horizon,),
  * each shifted by one spacing more. Each diagonal is a running sum. */
 static inline void hsep_splines_filtered_gram(
     const hsep_splines *self, const hsep_real filtered[], hsep_real triangle[])
@@ -278,7 +278,7 @@ static inline void hsep_splines_filtered_gram(
         hsep_real sum = 0.0;
         hsep_int u = 0;
         for (hsep_int j = n; j-- > d;) { /* rows 0 ... i - 1 have n, n - 1, ... entries */
-            for (; u + j * spacing < self->preview; u++) {
+            for (; u + j * spacing < self->horizon; u++) {
                 sum += filtered[u + d * spacing] * filtered[u];
             }
             const hsep_int i = j - d;
@@ -347,7 +347,7 @@ static inline void hsep_knots_rows(
 {
     hsep_zero(c, HSEP_N_DECIDED);
     hsep_knots_widen(self, x, c + HSEP_N_DECIDED);
-    hsep_splines_rows(splines, c, HSEP_N_DECIDED + self->n, splines->n - self->n, splines->preview, rows);
+    hsep_splines_rows(splines, c, HSEP_N_DECIDED + self->n, splines->n - self->n, splines->horizon, rows);
 }
 
 /* h, (m,), += the transpose of hsep_knots_widen of g, (n,). */
