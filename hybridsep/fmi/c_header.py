@@ -59,18 +59,9 @@ def c_header(table: FmuTable, guid: str, fmi: str = FMI_VERSIONS[0], weights: by
     embedded = (
         ",\n    .weights = hsep_embedded_weights,\n    .weights_size = sizeof hsep_embedded_weights" if weights else ""
     )
-    text = filled(
-        "table.h",
-        fmi=fmi,
-        name=table.name,
-        guid=json.dumps(guid),
-        n_modes=len(layout.modes) // len(_MODE),
-        window=layout.window,
-        starts=starts,
-        learned=learned,
-        angular=int(table.is_angular),
-        embedded=embedded,
-    )
+    sizes = {"n_modes": len(layout.modes) // len(_MODE), "window": layout.window, "angular": int(table.is_angular)}
+    parts = {"guid": json.dumps(guid), "starts": starts, "learned": learned, "embedded": embedded}
+    text = filled("table.h", fmi=fmi, name=table.name, **sizes, **parts)
     return _header(table.kind, table.name, text)
 
 
@@ -105,20 +96,11 @@ def _interface(kind: str) -> str:
     rows += [_row(variable, variable.name.partition(".")[2]) for variable in one]
     rows += [_row(variable, variable.name) for variable in layout.last]
     rows += [_row(window[0], name) for window, name in zip(layout.windows, windows, strict=True)]
-    return filled(
-        "interface.h",
-        model=json.dumps(model),
-        n_interpolated=len(slopes),
-        n_scalars=len(layout.scalars),
-        has_modes=int(bool(layout.modes)),
-        n_last=len(layout.last),
-        n_windows=len(windows),
-        length="HSEP_VR_Np" if windows else 0,
-        references=",\n".join(places),
-        macros=macros,
-        n_rows=len(rows),
-        rows=",\n".join(f"    {row}" for row in rows),
-    )
+    sizes = {"n_interpolated": len(slopes), "n_scalars": len(layout.scalars), "has_modes": int(bool(layout.modes))}
+    sizes |= {"n_last": len(layout.last), "n_windows": len(windows), "n_rows": len(rows)}
+    length, references = "HSEP_VR_Np" if windows else 0, ",\n".join(places)
+    parts = {"macros": macros, "rows": ",\n".join(f"    {row}" for row in rows)}
+    return filled("interface.h", model=json.dumps(model), length=length, references=references, **sizes, **parts)
 
 
 def c_bytes(name: str, content: bytes) -> str:

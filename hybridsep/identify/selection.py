@@ -148,7 +148,8 @@ def compare_structures(
         if rms < best * (1 - TOLERANCE):  # whatever is objected to it: a pole more may mend that
             best, best_order, white = rms, structure.order, _is_white(residual)
     offsets = [fit.offset for fit, _, _ in found if fit.structure.order] or [found[0][0].offset]
-    return [Candidate(fit, residual - float(np.median(offsets)), objection) for fit, residual, objection in found]
+    common = float(np.median(offsets))
+    return [Candidate(fit, residual - common, objection) for fit, residual, objection in found]
 
 
 def held_out(segment: Segment) -> Indices:
