@@ -187,12 +187,13 @@ HSEP_API void hsep_model_start_values(const hsep_context *context, double values
     const double start = values[HSEP_VR_x_d_ahead]; /* the drive rests there */
     /* The model with averaging predicts from the beginning, with the noise that is assumed. */
     const double noise = hsep_uncertainty_first_variance(values[HSEP_VR_lambda], values[HSEP_VR_noise_std]);
-    const int predicts = values[HSEP_VR_averaging] > 0.0 && values[HSEP_VR_compensate] == HSEP_SEP_HYBRID;
+    const hsep_sep_state compensate = (hsep_sep_state)values[HSEP_VR_compensate];
+    const int predicts = values[HSEP_VR_averaging] > 0.0 && compensate == HSEP_SEP_HYBRID;
     const double x_h_std = predicts && noise > 0.0 && noise < HUGE_VAL ? sqrt(noise) : 0.0;
     online_write_predicted(
         &(hsep_predictor_outputs){.x_d = start, .x_pb = start, .x_h = start, .x_h_std = x_h_std}, values);
     values[HSEP_VR_x_dm] = start;
-    values[HSEP_VR_sep_state] = values[HSEP_VR_compensate] > HSEP_SEP_OFF ? HSEP_SEP_PHYSICS : HSEP_SEP_OFF;
+    values[HSEP_VR_sep_state] = (double)(compensate == HSEP_SEP_OFF ? HSEP_SEP_OFF : HSEP_SEP_PHYSICS);
     values[HSEP_VR_rms_e] = values[HSEP_VR_no_measurement] = values[HSEP_VR_alarm] = 0.0;
 }
 
