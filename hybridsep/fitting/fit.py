@@ -111,20 +111,9 @@ def fit(
     Np = None if Np is None else PARAMETERS["Np"].checked(Np)
     logs = _logs(x_d, x, {"T_s": T_s, "unit": unit, "columns": columns, "axis": axis})
     T_s, shown = logs[0].T_s, logs[0].shown
-    for log in logs[1:]:
-        check_interval(log.path.name, log.T_s, logs[0].path.name, T_s)
-        if log.unit != logs[0].unit:
-            raise ParameterError(f"{log.path.name} is in {log.unit}, {logs[0].path.name} in {logs[0].unit}")
     findings = {log.path.name: checked(log) for log in logs}
     window = max(1, round(0.1 / T_s)) if Np is None else Np  # 0.1 s of a controller of which nothing is known
-    pieces = [[(one.x_d, moved_by_command(one)) for one in log.segments()] for log in logs]
-    recordings = [one for of_log in pieces for one in split_log(of_log, _SHARE, window)]
-    judging = max(len(recording.x) - recording.n_train for recording in recordings)
-    if Np is not None and Np > judging:
-        raise ParameterError(
-            f"Np must be at most {judging}, got {Np}: the first half of each log trains, and the longest stretch for "
-            f"the test has {judging} samples; give a smaller Np, or {2 * Np} samples or more without a gap"
-        )
+    recordings = _recordings(logs, window, fits=Np is not None)
     default = replace(with_window(PredictorSettings(T_s=T_s), window), **entries)
     default.check_replay()
     settings_to_try(default, p)  # which refuses what does not fit into the window
@@ -185,13 +174,31 @@ def fit(
 
 
 def _logs(x_d: Any, x: ArrayLike | None, reading: Mapping[str, Any]) -> tuple[Log, ...]:
-    """Return the logs that :func:`fit` is given, or the log of its arrays."""
+    """Return the logs that :func:`fit` is given, of one interval and in one unit, or the log of its arrays."""
     logs = (x_d,) if isinstance(x_d, Log) else tuple(x_d) if isinstance(x_d, list | tuple) else ()
     if not logs or not all(isinstance(one, Log) for one in logs):
         return (read_log(x_d if x is None else {"x_d": x_d, "x": x}, **reading),)
     if given := [name for name, value in {"x": x, **reading}.items() if value is not None]:
         raise ParameterError(f"{listed(given, str)} must be left out where a Log is given, which has said them")
+    first = logs[0]
+    for log in logs[1:]:
+        check_interval(log.path.name, log.T_s, first.path.name, first.T_s)
+        if log.unit != first.unit:
+            raise ParameterError(f"{log.path.name} is in {log.unit}, {first.path.name} in {first.unit}")
     return logs
+
+
+def _recordings(logs: Sequence[Log], Np: int, *, fits: bool) -> list[Recording]:
+    """Return the logs' pieces, split for training and test; windows of ``Np`` must fit into the test if ``fits``."""
+    pieces = [[(one.x_d, moved_by_command(one)) for one in log.segments()] for log in logs]
+    recordings = [one for of_log in pieces for one in split_log(of_log, _SHARE, Np)]
+    judging = max(len(recording.x) - recording.n_train for recording in recordings)
+    if fits and Np > judging:
+        raise ParameterError(
+            f"Np must be at most {judging}, got {Np}: the first half of each log trains, and the longest stretch for "
+            f"the test has {judging} samples; give a smaller Np, or {2 * Np} samples or more without a gap"
+        )
+    return recordings
 
 
 def _identified(

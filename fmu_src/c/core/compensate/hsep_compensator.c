@@ -13,7 +13,7 @@ HSEP_API hsep_real hsep_compensator_lay_out(hsep_compensator *self, const hsep_p
     self->trial_e = hsep_take(&end, horizon + (hsep_real)parameters->settings.p);
     self->target = hsep_take(&end, horizon);
     self->spline_pb = hsep_take(&end, horizon);
-    self->trial = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, parameters));
+    self->trial = hsep_take_block(&end, hsep_physics_lay_out(&(hsep_physics){0}, parameters)); /* up to planner */
     self->planner = hsep_take_block(&end, hsep_planner_lay_out(&(hsep_planner){0}, parameters));
     self->predictor = hsep_take_block(&end, hsep_predictor_lay_out(&(hsep_predictor){0}, parameters));
     if (parameters->averaging.averaging) {
@@ -339,7 +339,7 @@ HSEP_API int hsep_compensator_sample(hsep_compensator *self, hsep_real x_d_ahead
     const hsep_real *x_d = hsep_at(predictor, predictor->x_d) - predictor->late;
     hsep_real *x_dm = hsep_at(self, self->x_dm) - predictor->late;
     const hsep_real error = (predictor->early ? predictor->next : x_meas) - x_d[i];
-    const int is_sound = compensator_monitor(self, error, x_dm[i] - x_d[i]) || !self->newton;
+    const int is_sound = compensator_monitor(self, error, x_dm[i] - x_d[i]) || !self->newton; /* the paper's: all */
     if (hsep_predictor_take_in(predictor, x_d_ahead, x_meas, is_sound)) {
         hsep_predictor_finish(predictor);
         hsep_copy(x_dm, x_dm + predictor->Np, predictor->late);

@@ -37,7 +37,7 @@ HSEP_API hsep_real hsep_newton_lay_out(hsep_newton *self, const hsep_predictor_p
     self->gram = hsep_take(&end, hsep_triangle(knots.m));
     self->W = hsep_take(&end, m * horizon);
     self->linearised = hsep_take_block(&end, hsep_linearised_lay_out(&(hsep_linearised){0}, parameters));
-    self->physics = hsep_take_block(&end, filter);
+    self->physics = hsep_take_block(&end, filter); /* up to trial, which tells its size */
     self->trial = hsep_take_block(&end, filter);
     return end * sizeof(hsep_real);
 }
@@ -408,7 +408,7 @@ static void newton_vary(hsep_newton *self, const hsep_newton_task *task, const h
     } \
     self->left -= hsep_min(newton_of_solution(self, self->halves), self->left)
 
-/* Make a plan, from one yield to the next. */
+/* Make a plan, from one yield to the next; what all of them count as is in newton_of_plan. */
 static void newton_go_on(hsep_newton *self, const hsep_newton_task *task)
 {
     const hsep_int all = self->late + self->horizon;

@@ -24,7 +24,7 @@ HSEP_API hsep_real hsep_predictor_lay_out(hsep_predictor *self, const hsep_predi
     self->p = parameters->settings.p;
     self->q = parameters->settings.q;
     self->n_init = parameters->n_init;
-    self->ahead = hsep_take(&end, preview);
+    self->ahead = hsep_take(&end, preview); /* from here up to ahead_pb all begins at start: block_init */
     self->x_d = predictor_take(&end, late, horizon);
     self->x_pb = predictor_take(&end, late, Np);
     self->x_h = predictor_take(&end, late, Np);
