@@ -44,7 +44,7 @@ class SepCompensator:
     Sample by sample, call :meth:`step`. Or for each window, call :meth:`plan` with the commanded positions ahead, send
     its ``x_dm`` to the drive, then call :meth:`update` with the measured positions.
 
-    Where its :attr:`monitor` has tripped, or lost the measurement, no model plans, and the change of the command fades.
+    Where its :attr:`monitor` has tripped, or lost the measurement, no model plans, and a plan ends compensation.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class SepCompensator:
         self._planning.restart()
         n_lost = samples_before(self.settings.measurement_timeout, self.T_s)
         self.monitor = Monitor(n_lost, self.settings.following_error_max)
-        # Coefficients of the remainder of the last plan; (2, n), m: last values of x_d and of δ
+        # Coefficients of the remainder of the last plan, and of its stop; (2, n), m: last values of x_d and of δ
         self._previous_plan = np.zeros(N_DECIDED + self._basis.n_free)
         self._last_stop = np.zeros(0 if self._stop is None else self._stop.n)
         self._before = np.repeat([[np.nan], [0.0]], max(3, predictor.settings.n_late), axis=1)
@@ -176,8 +176,8 @@ class SepCompensator:
         loads = np.concatenate((loads, np.full(len(more), loads[-1])))
         x_d_before, delta_before = self._before[:, -3:]
         task = PlanTask(path, loads, x_d_before, delta_before, self._previous_plan, self._state_before)
-        fades = self.monitor.is_tripped or self.monitor.is_lost
-        chosen = self._planning.choose(predictor, task, SepState.OFF if fades else self.compensate)
+        ends = self.monitor.is_tripped or self.monitor.is_lost
+        chosen = self._planning.choose(predictor, task, SepState.OFF if ends else self.compensate)
         coefficients, stop = chosen.coefficients, self._last_stop
         if self._stop is not None:
             limits = self._planning.bounds.hard(command, x_d_before, delta_before, turns=len(command))

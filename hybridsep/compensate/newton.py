@@ -12,10 +12,11 @@ the model knows nothing the plan is the physics model's.
 The slope at given commands is ``sech²(v/v_i)`` for friction and ``2|x|`` for stiffness. Stop operators, the weights of
 the experts and of the stack, and the shrinking by the variance, are held constant:
 
-``∂x_h = (1 − π_c) G_pb + Σ_i π_i ∂f_i + π_c ∂x_c``
+``∂x_h = (1 − π_c − π_r) G_pb + Σ_i π_i ∂f_i + (π_c + π_r) ∂x_c``
 
 ``c`` is ``arx_command``, linear and time-invariant: its features are increments and lags of the command. ``i`` are
-``arx_residual`` and ``static``; ``fresh_start`` counts as the expert whose counterpart it is.
+``arx_residual`` and ``static``; ``fresh_start`` counts as the expert whose counterpart it is. ``π_r`` is of what
+``recall`` moves by the answer of ``arx_command``.
 """
 
 import math
@@ -92,9 +93,8 @@ class PlanModel:
         window = self._window(x_d)
         self.scales, of_physics = model.scales_of(window)
         self._solved = model.solved(self.scales)
-        rows = np.arange(len(late) + len(x_d))
-        beyond = rows[len(late) + model.settings.Np :]
-        beyond -= np.arange(len(beyond)) % _VARIANCE_STRIDE
+        rows, first = np.arange(len(late) + len(x_d)), len(late) + model.settings.Np
+        rows[first:] -= np.arange(len(rows[first:])) % _VARIANCE_STRIDE  # after the window some stand for others
         # Prediction under ``x_d``, whose variances all others have.
         self.of_previous_plan = model.forecast_by(
             *(self._solved, window, self.scales), variance_rows=rows, of_physics=of_physics

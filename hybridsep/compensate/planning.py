@@ -63,7 +63,7 @@ class PlanTask:
 class ChosenPlan(NamedTuple):
     """Plan of a window."""
 
-    state: SepState  # model that planned it
+    state: SepState  # model that planned it, or what is left of it
     coefficients: Array  # (3 + n_free,), m
     scales: FeatureScales | None  # of the residual model's features
     share: float | None = None  # as :class:`PendingPlan` has it, if the residual model planned
@@ -298,7 +298,7 @@ class AveragedPlanning(Planning):
             end = len(self.ahead) * self.Np
             self.ahead[-1] = model.of_previous_plan.stacked[:, end - self.Np : end]
         if physics is None:
-            return ChosenPlan(SepState.OFF, previous_plan, scales)
+            return ChosenPlan(task.state_before, previous_plan, scales)
         if not has_learned:
             return ChosenPlan(SepState.PHYSICS, physics, scales)
         with np.errstate(all="ignore"):
@@ -320,7 +320,7 @@ class AveragedPlanning(Planning):
                     step *= share * left if left > 0.0 else 0.0  # not NaN
                     return ChosenPlan(SepState.HYBRID, previous_plan + step, scales, share=share, reach=reach)
             if is_better(last.cost, of_physics.cost):
-                return ChosenPlan(SepState.OFF, last.coefficients, scales, reach=reach)
+                return ChosenPlan(task.state_before, last.coefficients, scales, reach=reach)
         return ChosenPlan(SepState.PHYSICS, physics, scales, reach=reach)
 
     def _share_of(self, change: Array) -> float:

@@ -38,9 +38,7 @@ _NO_MEASUREMENT = (
     "whether x_meas was missing for measurement_timeout: the change of the command fades until it comes again"
 )
 _STD = "standard deviation of x_meas - x_h, now; 0: not known"
-_ALARM = (
-    "whether it tripped: for three samples x_meas - x_d, or its geometric mean with x_meas - x_dm, was over its limit"
-)
+_ALARM = "it tripped: x_meas - x_d, or its geometric mean with x_meas - x_dm, was over its limit for three samples"
 # no input: several masters set all inputs by setReal
 _RESET = "a rising edge ends a trip; what was learned before it stays"
 _LOAD = (
@@ -194,7 +192,7 @@ def _compensator_variables(parameters: Mapping[str, Value], modes: Sequence[Mapp
     plan = (*ahead, *model)
     prediction = "prediction for now under x_dm, with averaging by its model, else by the model that planned the window"
     error = "predicted servo error x_d - x_h that is left"
-    state = "model that planned what x_dm follows now; off, too, where the rest of an earlier plan is best"
+    state = "model that planned what x_dm follows now"
     return [
         _position("x_d_ahead", "input", "commanded position entering the look-ahead, preview samples early", start=0.0),
         _position("x_meas", "input", "measured position now", start=0.0),

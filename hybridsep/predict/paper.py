@@ -79,8 +79,8 @@ class PaperModel:
         are learned; the next window starts from them in any case; ``ahead``: none. Returns (m,).
         """
         m, Np = len(x), self.settings.Np
-        measured, regression = forecast.window.x_pb[:m], self.regression
-        x_pb, e_pb = np.concatenate((self.x_pb, measured)), np.concatenate((self.e_pb, x - measured))
+        predicted, regression = forecast.window.x_pb[:m], self.regression
+        x_pb, e_pb = np.concatenate((self.x_pb, predicted)), np.concatenate((self.e_pb, x - predicted))
         p, q = len(self.e_pb), len(self.x_pb)
         for k in range(0, m, Np) if fold else ():
             n = min(Np, m - k)

@@ -179,9 +179,9 @@ class HybridPredictor:
 
         May be called again, with other commands or another length, before :meth:`update`; the last call counts.
 
-        ``x_d``, (n,), m: commanded positions of the next ``n ≥ 1`` samples, usually ``n = Np``. From a compensator:
-        ``path``, (m,), m: commands of its preview before they are modified; with averaging ``scales`` of the features.
-        Both from ``x_d`` if left out. SignalError if ``x_d`` is empty, not one-dimensional or not finite.
+        ``x_d``, (n,), m: commands to the drive, with known loads, over the next ``n ≥ 1`` samples, usually ``Np``. From
+        a compensator: ``path``, (m,), m: commands of its preview before they are modified; with averaging ``scales`` of
+        the features. Both from ``x_d`` if left out. SignalError if ``x_d`` is empty, not one-dimensional or not finite.
         """
         command, state = as_samples(x_d, "x_d", T_s=self.T_s), self.state
         n, late = len(command), len(state.late)
@@ -300,7 +300,7 @@ class HybridPredictor:
 
     @property
     def weights(self) -> Array:
-        """``w`` of eq. (6) from all learned samples, ``(n,)``."""
+        """``w`` of eq. (6) from all learned samples, ``(n,)``; with averaging without penalties: not what predicts."""
         return self.regression.weights
 
     @property

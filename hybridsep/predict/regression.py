@@ -48,7 +48,9 @@ class PenalisedSolution(NamedTuple):
 
     weights: Array  # (m,)
     triangle: Array  # (m, m): ``R`` with ``RᵀR = ΦᵀΦ + diag(penalties)``
-    residual_sum: float  # ``Σ (target − wᵀφ)² + λ‖w‖²`` over the rows so far, without the penalties
+    residual_sum: (
+        float  # ``Σ (target − wᵀφ)² + λ‖w‖²`` over the rows so far, λ the factor's, without the penalties here
+    )
 
     def leverage(self, rows: Array) -> Array:
         """Return ``φᵀ(RᵀR)⁻¹φ`` of rows φ, ``(k, m)``: the variance of ``wᵀφ`` relative to the noise's."""

@@ -49,7 +49,7 @@ class Prediction:
     """Prediction of one window."""
 
     x_pb: Array  # (n,), m: physics-based prediction, eq. (2)
-    e_h: Array  # (n,), m: predicted residual ``wᵀφ``, during the warm-up too
+    e_h: Array  # (n,), m: predicted residual, ``wᵀφ`` or the experts' weighted sum, during the warm-up too
     x_h_std: Array  # (n,), m: standard deviation of the error ``x − x_h`` against the measured position
     n_warm_up: int  # leading samples within the warm-up, where ``x_h = x_pb``
 

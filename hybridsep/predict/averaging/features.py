@@ -9,8 +9,9 @@ functions of the user's own. First differences of them take up errors of ``G_pb`
 it lacks. As nothing here depends on the learned weights, no recursion can become unstable.
 
 The expert without a physics model, eq. (4) with ``G_pb = 1``, predicts the residual of the command,
-``e_0(k) = x(k) − x_d(k − d)``, where ``d`` is the physics model's dead time less two samples, at least 0; its features
-are a constant and the increments ``x_d(k−d−j) − x_d(k−d−j−1)``, ``j = 0 … p``, beside ``p`` lags of it.
+``e_0(k) = x(k) − x_d(k − d)``, where ``d`` is the physics model's dead time less two samples, or less half of it if
+that is more, at least 0; its features are a constant and the increments ``x_d(k−d−j) − x_d(k−d−j−1)``,
+``j = 0 … p``, beside ``p`` lags of it.
 """
 
 from collections.abc import Callable

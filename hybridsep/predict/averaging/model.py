@@ -194,7 +194,7 @@ class AveragedModel:
 
     @property
     def lag_weights(self) -> Array:
-        """Weights of the lags from all learned samples, ``(p,)``."""
+        """Weights of the lags from all learned samples, ``(p,)``, without penalties: no prediction uses them."""
         return self.regressions[MODEL_RESIDUAL].weights[self.static.n :]
 
     def restart(self) -> AveragedModel:

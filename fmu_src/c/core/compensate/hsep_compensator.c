@@ -189,7 +189,8 @@ static void compensator_solve(hsep_compensator *self)
     if (self->newton) { /* it is followed when it is due, so nothing depends on when it is made */
         const hsep_newton_task task = compensator_task(self);
         hsep_newton_run(hsep_compensator_newton(self), &task, left);
-        self->state = done ? hsep_compensator_newton(self)->planned : self->state;
+        const hsep_int planned = hsep_compensator_newton(self)->planned; /* 0: off, or the last plan's remainder */
+        self->state = !done ? self->state : planned || !self->compensate ? planned : self->before;
     } else { /* an equal share of the solver's steps, in halves; where no sample is pinned all, -1 */
         const hsep_int due = left > 0 ? 2 * ((HSEP_QP_STEPS + pinned - 1) / pinned) : (hsep_int)-1;
         done = 0;
@@ -285,7 +286,7 @@ HSEP_API void hsep_compensator_begin(hsep_compensator *self)
         const hsep_newton_task task = compensator_task(self);
         self->before = self->state;
         predictor->n_physics = hsep_predictor_warm_up(predictor, 0);
-        hsep_newton_begin(hsep_compensator_newton(self), &task, self->compensate);
+        hsep_newton_begin(hsep_compensator_newton(self), &task, self->compensate, self->before);
     }
     const int solving = self->newton || compensator_plan(self);
     if (!solving) {

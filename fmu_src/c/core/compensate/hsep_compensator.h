@@ -6,8 +6,7 @@
  * HSEP_PLANNING_PINNED_AVERAGED samples at most (hsep_newton_run).
  *
  * A sample costs what hsep_predictor.h says, and an equal share of a plan where it follows the last one; without
- * averaging more where fewer than 8 do (Np < 16, or spacing does not divide 8), or all of it at once. It is bounded by
- * the parameters; 1000 splines in a plan are far from real time.
+ * averaging more where fewer than 8 do (Np < 16, or spacing does not divide 8), or all: bounded by the parameters.
  *
  * Once the parameters are in range nothing here fails but the prediction of a window, as in hsep_predictor.h.
  */

@@ -4,10 +4,10 @@
  * for friction, and 2 |x| for stiffness. Stop operators, the weights of the experts and of the stack, and the shrinking
  * by the variance, are held constant:
  *
- *   dx_h = (1 - pi_c) G_pb + sum_i pi_i df_i + pi_c dx_c
+ *   dx_h = (1 - pi_c - pi_r) G_pb + sum_i pi_i df_i + (pi_c + pi_r) dx_c
  *
  * c is arx_command, linear and time-invariant: its features are increments and lags of the command. i are arx_residual
- * and static; fresh_start, which doubts earlier runs, counts as the expert whose counterpart it is.
+ * and static; fresh_start counts as the expert whose counterpart it is; r is what recall moves by c's answer.
  */
 #ifndef HSEP_LINEARISED_H
 #define HSEP_LINEARISED_H

@@ -518,7 +518,7 @@ HSEP_API void hsep_newton_run(hsep_newton *self, const hsep_newton_task *task, h
     self->left -= hsep_min(done, self->left);
 }
 
-HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int allowed)
+HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int allowed, hsep_int before)
 {
     const hsep_predictor *predictor = task->predictor;
     const hsep_real *residuals = hsep_at_const(predictor, predictor->past_e) + predictor->n; /* last ones measured */
@@ -542,7 +542,7 @@ HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task,
     hsep_averaged_forecast(
         task->model, hsep_at(self, self->command), hsep_at(self, self->x_pb), path, self->horizon,
         hsep_at(self, self->e_h), self->samples);
-    self->ends = allowed == 0 && self->planned > 0;
+    self->ends = allowed == 0 && before > 0;
     self->planned = allowed > 0;
     self->is_physics = allowed == 1;
     self->judges = self->planned && (hsep_real)predictor->k >= predictor->n_init && task->model->predicted[HSEP_STATIC];

@@ -83,8 +83,8 @@ HSEP_API void hsep_newton_init(
     hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan, but only samples that the plan leaves as they are,
- * and late ones. allowed: the best model that may plan: 0 none, 1 physics, 2 averaged, which judges if warmed up. */
-HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int allowed);
+ * and late ones. allowed: the best model that may plan: 0 none, 1 physics, 2 averaged; before: of the last plan. */
+HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int allowed, hsep_int before);
 
 /* Do parts of the plan: this sample's equal share of what is left, samples being left until the plan is due; all of it
  * in the last one, in which the plan is made and the window predicted. */
