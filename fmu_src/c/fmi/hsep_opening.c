@@ -130,6 +130,15 @@ typedef struct {
 } opening_table;
 HSEP_ASSERT_WORDS(opening_table, 12);
 
+/* Whether a text is ASCII, so that a message may quote it. */
+static int opening_is_plain(const char *text)
+{
+    while (*text != '\0' && (unsigned char)*text < 128) {
+        text++;
+    }
+    return *text == '\0';
+}
+
 /* Check a table of size bytes, and fill the context with what it tells. reason: what is wrong with it. */
 static hsep_status opening_fill(hsep_context *context, const opening_table *table, size_t size, char reason[])
 {
@@ -143,7 +152,7 @@ static hsep_status opening_fill(hsep_context *context, const opening_table *tabl
         HSEP_N_SCALARS + HSEP_MODE_NUMBERS * (double)table->n_modes + HSEP_N_LAST; /* of the start values */
     const int modes_fit = HSEP_HAS_MODES ? table->n_modes > 0 : table->n_modes == 0;
     if ((double)size != (double)sizeof *table + (n + 1.0) * (double)sizeof(double) || table->size != size ||
-        !modes_fit || table->angular > 1 || table->guid[HSEP_GUID_SIZE - 1] != '\0') {
+        !modes_fit || table->angular > 1 || table->guid[HSEP_GUID_SIZE - 1] != '\0' || !opening_is_plain(table->guid)) {
         return hsep_message_add(reason, "it is damaged or truncated");
     }
     if (!hsep_is_sealed(table, size)) {
