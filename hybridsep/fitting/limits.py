@@ -25,8 +25,9 @@ _ZERO, _VARIES = 10.0, 0.999
 """Offset of command and measurement, relative to what the error varies by in this share of the samples, from which on
 limits do not count it."""
 
-_PIECES, _SHORTEST, _FEW, _USUAL = 40, 100, 10, 0.75  # of a log; samples; those in motion that tell; share that does
-_FAR = 3.0  # largest error that counts, relative to the usual one: good logs have 2.6 at most
+_PIECES, _SHORTEST, _FEW = 40, 100, 10  # of a log; samples; those in motion that tell
+_LEAST = 1e-9  # speed and acceleration, relative to the log's largest: a piece at a constant speed tells of no other
+_FAR = 3.0  # largest error that counts, relative to the usual one: good logs have 2.5 at most
 
 FOLLOWING_ERROR = 1.3
 """``following_error_max`` relative to the largest servo error without compensation: on 300 sound loops of two masses no
@@ -102,10 +103,10 @@ def usual_error(recordings: Sequence[Recording], T_s: float) -> float:
     found = [[*_motion(x_d, T_s)[:2], np.nanmax(one)] for x_d, one in pieces if np.isfinite(one).any()]
     motion, (errors,) = np.split(np.reshape(found, (-1, 3)).T, [2])
     fastest = np.maximum(motion.max(axis=1, initial=0.0, keepdims=True), np.finfo(float).tiny)
-    demand = (motion / fastest).max(axis=0)
-    moving = demand > 0.0
-    usual = float(np.quantile(errors[moving] / demand[moving], _USUAL)) if moving.sum() >= _FEW else 0.0
-    return usual or math.inf
+    moving = motion.any(axis=0)
+    # By each alone: short moves accelerate as much as long ones, and err by their lower speed
+    by_each = errors[moving] / np.maximum((motion / fastest)[:, moving], _LEAST)
+    return (float(np.median(by_each, axis=1).max()) if moving.sum() >= _FEW else 0.0) or math.inf
 
 
 def far_words(error: float, usual: float, shown: DisplayUnits) -> str:

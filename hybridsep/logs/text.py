@@ -445,7 +445,9 @@ def _comma_of(columns: Sequence[Sequence[str]]) -> tuple[str | None, bool]:
     points = any("." in text for text in numbers)
     several = any(text.count(",") > 1 for text in commas)
     settled = not all(map(_THOUSANDS.fullmatch, commas))
-    if not commas and any(_passes_1000([text.replace(".", ",") for text in column]) for column in columns):
+    swapped = [[text.replace(".", ",") for text in column] for column in columns] if points and not commas else []
+    grouped = all(_THOUSANDS.fullmatch(text) for column in swapped for text in column if "," in text)
+    if grouped and any(map(_passes_1000, swapped)):
         return ".", True  # points are between thousands, and refused
     if not settled and (points or several or any(map(_passes_1000, columns))):
         return "", True

@@ -196,8 +196,7 @@ def test_windows_can_be_left_out_and_nothing_else_is_missing(
 
 
 def rotary(folder: Path, machine: str = "emps", more: str = "") -> Machine:
-    unit = ("T_s =", 'unit = "rad"\nT_s =')
-    return load_machine(changed_machine(folder / "table.toml", machine, unit, more=more))
+    return load_machine(changed_machine(folder / "table.toml", machine, ("T_s =", 'unit = "rad"\nT_s ='), more=more))
 
 
 def test_a_rotary_axis_has_radians_for_metres(tmp_path: Path) -> None:

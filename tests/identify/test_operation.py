@@ -30,8 +30,7 @@ def value(found: IdentifiedModel, name: str) -> tuple[float, float]:
 
 def difference(found: IdentifiedModel, truth: ModalModel, input_hold: str, x_d: Array) -> float:
     """Return the largest difference of the responses to a command, m."""
-    ours = measured(found.model, x_d, found.input_hold)
-    return float(np.abs(ours - measured(truth, x_d, input_hold)).max())
+    return float(np.abs(measured(found.model, x_d, found.input_hold) - measured(truth, x_d, input_hold)).max())
 
 
 def test_a_lag_as_a_mode_is_exact() -> None:

@@ -56,8 +56,7 @@ def physics(
 def features(x_pb: Sequence[float], e_pb: Sequence[float], k: int, p: int, q: int) -> list[float]:
     """Eq. (5): ``[1, x_pb(k) … x_pb(k−q), e_pb(k−1) … e_pb(k−p)]``, zero before the first sample; ``(2+q+p,)``."""
     past_x = [x_pb[k - i] if k - i >= 0 else 0.0 for i in range(q + 1)]
-    past_e = [e_pb[k - i] if k - i >= 0 else 0.0 for i in range(1, p + 1)]
-    return [1.0, *past_x, *past_e]
+    return [1.0, *past_x, *(e_pb[k - i] if k - i >= 0 else 0.0 for i in range(1, p + 1))]
 
 
 def ridge(rows: Array, target: Array, lam: float) -> Array:
