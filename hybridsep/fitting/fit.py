@@ -137,13 +137,12 @@ def fit(
     found = replace(found, findings=(*found.findings, *filter(None, (period, far))))
     tried = beginnings(recordings, _TRIED_MAX)
     needed = model.needed_preview(T_s, default.input_hold)
-    ahead = needed if ahead is None else ahead
     # A compensator has shorter windows, and what the predictor has learned is to serve it, too
     limits: dict[str, Any] = {**estimated_limits(recordings, T_s, usual), **given_limits}
     if given_limits:
         limits.pop("estimated", None)
     own = Limits(**{one: limits[one] for one in Limits.parameters()}) if limits else None
-    compensation = CompensatorSettings(preview=ahead, limits=own, change_max=limits.get("change_max"))
+    compensation = CompensatorSettings(preview=ahead or needed, limits=own, change_max=limits.get("change_max"))
     most = compensation.window(needed, T_s)
     if look_ahead is not None and p and max(p) > most:
         raise ParameterError(
@@ -190,7 +189,7 @@ def _logs(x_d: Any, x: ArrayLike | None, reading: Mapping[str, Any]) -> tuple[Lo
 
 def _recordings(logs: Sequence[Log], Np: int, *, fits: bool) -> list[Recording]:
     """Return the logs' pieces, split for training and test; windows of ``Np`` must fit into the test if ``fits``."""
-    pieces = [[(one.x_d, moved_by_command(one)) for one in log.segments()] for log in logs]
+    pieces = ([(one.x_d, moved_by_command(one)) for one in log.segments()] for log in logs)
     recordings = [one for of_log in pieces for one in split_log(of_log, _SHARE, Np)]
     judging = max(len(recording.x) - recording.n_train for recording in recordings)
     if fits and Np > judging:

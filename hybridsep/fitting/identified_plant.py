@@ -150,8 +150,7 @@ def commands_to_try(recordings: Sequence[Recording]) -> Array:
     distances = [float(np.abs(np.diff(one.x_d)).sum()) for one in recordings]
     found = recordings[distances.index(max(distances))].x_d
     moving = np.flatnonzero(np.diff(found))
-    # With 100 samples of rest before the motion
-    found = found[max(int(moving[0]) - 100, 0) if len(moving) else 0 :][:_COMMANDS_MAX]
+    found = found[max(int(moving[0]) - 100, 0) if len(moving) else 0 :][:_COMMANDS_MAX]  # from 100 samples of rest on
     steps = np.abs(np.diff(found))
     at_rest = np.flatnonzero(steps <= 1e-3 * steps.max(initial=0.0)) + 1
     last = int(at_rest[-1]) + 1 if len(at_rest) else 0

@@ -48,8 +48,7 @@ class PublishedWindow:
     x_h_std: Array  # (Np,), m: standard deviation of the error of ``x_h``; 0 where it is not known
     state: int  # model that planned it (:class:`SepState`); 0 without a planner
     n_warm_up: int  # leading samples where ``x_h = x_pb``
-    # number of leading samples that follow the plan before, while a real-time implementation makes this plan; and the
-    # model that planned them
+    # leading samples that follow the plan before, while a controller makes this one; and the model that planned them
     n_followed: int = 0
     state_before: int = 0
 
