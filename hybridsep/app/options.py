@@ -115,7 +115,7 @@ def takes_reading(command: Callable[..., None]) -> Callable[..., None]:
 
 # In words what `fitting.limits.estimated_limits` computes, whose import every --help would wait for
 _LEFT_OUT = {"v_max": "1.25 times the log's", "a_max": "twice the log's", "j_max": "5 times the log's"}
-_LEFT_OUT |= {"change_max": "twice the log's largest usual servo error", "following_error_max": "1.3 times that error"}
+_LEFT_OUT |= {"change_max": "twice the log's largest servo error", "following_error_max": "1.3 times the usual one"}
 
 
 def takes_known(command: Callable[..., None]) -> Callable[..., None]:

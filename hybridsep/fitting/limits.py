@@ -115,8 +115,8 @@ def far_words(error: float, usual: float, shown: DisplayUnits) -> str:
         return ""
     found, counted = shown.words(error, ".4g"), shown.words(_FAR * usual, ".4g")
     return (
-        f"the largest servo error, {found}, is {error / usual:.3g} times what most of the motion lets expect: limits "
-        f"that follow from the log take it for {counted}; look at it in the report"
+        f"the largest servo error, {found}, is {error / usual:.3g} times what most of the motion lets expect: a "
+        f"following_error_max that follows from the log takes it for {counted}; look at it in the report"
     )
 
 
@@ -124,12 +124,11 @@ def estimated_limits(recordings: Sequence[Recording], T_s: float, usual: float =
     """Return entries of ``[drive_limits]`` from the motion of the commands, marked as estimates; empty without motion.
 
     They are :data:`MARGINS` times the largest velocity, acceleration and jerk; the command may change by twice the
-    largest servo error, and the compensator trips above :data:`FOLLOWING_ERROR` times it. An error far above the
-    ``usual`` one, m, as of a drive that ran away, counts as :data:`_FAR` times that.
+    largest servo error, and the compensator trips above :data:`FOLLOWING_ERROR` times it, of which an error far above
+    the ``usual`` one, m, as of a drive that ran away, counts as :data:`_FAR` times that.
     """
     peaks, error = largest_motion(recordings, T_s)
-    error = min(error, _FAR * usual)
-    bounds = (*(MARGINS * peaks).tolist(), 2.0 * error, FOLLOWING_ERROR * error)
+    bounds = (*(MARGINS * peaks).tolist(), 2.0 * error, FOLLOWING_ERROR * min(error, _FAR * usual))
     values = list(zip(DRIVE_LIMIT_ENTRIES.items(), bounds, strict=True))
     if not all(value >= (one.minimum or one.nonzero) for (_, one), value in values):
         return {}

@@ -136,14 +136,14 @@ def test_limits_are_estimated_from_the_motion() -> None:
 
 @pytest.mark.parametrize(("runaway", "told"), [(0.0, ""), (0.08, "80.48 mm, is 167 times")])
 def test_limits_leave_out_errors_far_above_the_usual(runaway: float, told: str) -> None:
-    """A drive with a limiter of its own ran away in a log, and then in the loop: it was allowed 81 mm."""
     one = recorded(StageDrive(ModalModel([MODE])))
     largest, x = np.abs(one.x_d - one.x).max(), one.x + runaway * (np.arange(len(one.x)) // 100 == 9)
     usual = usual_error([log := replace(one, x=x), replace(one, x=np.full(len(x), np.nan))], T_S)
     assert usual == pytest.approx(largest, rel=0.2)
-    found = estimated_limits([log], T_S, usual)["following_error_max"]
-    assert found == pytest.approx(1.3 * min(largest + runaway, 3.0 * usual), rel=1e-3)
-    assert told in far_words(largest + runaway, usual, shown_in("mm"))
+    found, error = estimated_limits([log], T_S, usual), largest + runaway
+    limits = found["change_max"], found["following_error_max"]
+    assert limits == pytest.approx((2.0 * error, 1.3 * min(error, 3.0 * usual)), rel=1e-2)
+    assert told in far_words(error, usual, shown_in("mm"))
 
 
 def test_the_error_of_the_only_fast_move_is_usual() -> None:
