@@ -67,7 +67,7 @@ def asked_for(axis: Axis, x_d: Array) -> float:
     drive, forces = TwoMassDrive(axis, float(x_d[0])), [0.0]
     for command in x_d.tolist():
         drive.step(command)
-        forces.append(drive._drive[-9])  # the state FORCE of drive.c
+        forces.append(drive._drive[-9])  # x[FORCE], before the last eight numbers of drive.c's struct
     return largest(np.array(forces))
 
 

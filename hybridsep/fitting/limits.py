@@ -25,8 +25,8 @@ _ZERO, _VARIES = 10.0, 0.999
 """Offset of command and measurement, relative to what the error varies by in this share of the samples, from which on
 limits do not count it."""
 
-_PIECES, _SHORTEST, _FEW = 40, 100, 10  # of a log; samples; those in motion that tell
-_LEAST = 1e-9  # speed and acceleration, relative to the log's largest: a piece at a constant speed tells of no other
+_PIECES, _SHORTEST, _FEW = 40, 100, 10  # pieces of a log; samples of a piece, at least; fewest in motion that tell
+_LEAST = 1e-9  # acceleration of a piece at constant speed, relative to the log's largest: an error is divided by it
 _FAR = 3.0  # largest error that counts, relative to the usual one: good logs have 2.5 at most
 
 FOLLOWING_ERROR = 1.3

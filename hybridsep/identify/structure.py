@@ -71,8 +71,9 @@ class Structure:
         """Return the range of the nonlinear parameters with poles no slower than ``slowest``, rad/s."""
         slowest = min(slowest, 1.0 / T_s)
         mode_low, mode_high = [slowest, _ZETA_RANGE[0]], [2 * np.pi * FASTEST / T_s, _ZETA_RANGE[1]]
+        low = mode_low * self.n_modes + [slowest] * self.lag
         high = mode_high * self.n_modes + [10.0 / T_s] * self.lag
-        return np.log(mode_low * self.n_modes + [slowest] * self.lag), np.log(high)
+        return np.log(low), np.log(high)
 
     def slowest_rate(self, theta: Array) -> float:
         """Return the rate of its slowest pole, 1/s, of one that swings at least its frequency; infinite without any."""

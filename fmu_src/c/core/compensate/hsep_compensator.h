@@ -6,7 +6,7 @@
  * HSEP_PLANNING_PINNED_AVERAGED samples at most (hsep_newton_run).
  *
  * A sample costs what hsep_predictor.h says, and an equal share of a plan where it follows the last one; without
- * averaging more where fewer than 8 do (Np < 16, or spacing does not divide 8), or all: bounded by the parameters.
+ * averaging more where fewer than 8 do (Np < 16, or spacing does not divide 8), or it all at once.
  *
  * Once the parameters are in range nothing here fails but the prediction of a window, as in hsep_predictor.h.
  */

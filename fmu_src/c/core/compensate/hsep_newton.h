@@ -83,7 +83,7 @@ HSEP_API void hsep_newton_init(
     hsep_newton *self, const hsep_predictor_parameters *parameters, hsep_planner *plans, const hsep_real spline[]);
 
 /* Begin a window: predict it under the remainder of the last plan, but only samples that the plan leaves as they are,
- * and late ones. allowed: the best model that may plan: 0 none, 1 physics, 2 averaged; before: of the last plan. */
+ * and late ones. allowed: the best model that may plan: 0 none, 1 physics, 2 averaged; before: the last plan's. */
 HSEP_API void hsep_newton_begin(hsep_newton *self, const hsep_newton_task *task, hsep_int allowed, hsep_int before);
 
 /* Do parts of the plan: this sample's equal share of what is left, samples being left until the plan is due; all of it
